@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// asi_timing_pkg: every time of the line, in nanoseconds, and the one way to turn it into clocks.
+// Names and values: requirements LT-001 .. LT-014 (docs/requirements.md). Anchors are pulse starts.
+package asi_timing_pkg;
+  localparam int unsigned HalfBitNs   = 3_000;       // half a bit, the pulse grid
+  localparam int unsigned WinEarlyNs  = 875;         // P_WIN_EARLY: a pulse may start this early
+  localparam int unsigned WinLateNs   = 1_500;       // P_WIN_LATE: ... or this late
+  localparam int unsigned FilterNs    = 750;         // comparator pulses shorter than this are ignored
+  localparam int unsigned RxQuietNs   = 6_000;       // P_RX_QUIET: silence after the end pulse of an answer
+  localparam int unsigned RxOpenNs    = 12_000;      // P_RX_OPEN: earliest answer after the last request pulse
+  localparam int unsigned RxTimeoutNs = 66_000;      // P_RX_TIMEOUT: latest answer after the last request pulse
+  localparam int unsigned GapOkNs     = 18_500;      // P_GAP_OK: last answer pulse to the next request
+  localparam int unsigned GapNorspNs  = 6_000;       // P_GAP_NORSP: end of the time-out to the next request
+  localparam int unsigned GapErrNs    = 24_000;      // P_GAP_ERR: quiet time after a bad answer
+  localparam int unsigned BabbleMaxNs = 1_000_000;   // P_BABBLE_MAX: longest wait for that quiet time
+  localparam int unsigned IdleStartNs = 60_000;      // P_IDLE_START: quiet time before the first request
+  localparam int unsigned TxBiasNs    = 12_000;      // P_TX_BIAS: longest lead of tx_en before the first edge
+  localparam int unsigned ApfOnNs     = 1_000_000;   // P_APF_ON: power low this long -> APF
+  localparam int unsigned ApfOkNs     = 10_000_000;  // P_APF_OK: power good this long -> no APF
+
+  // Clocks in a time; ClkHz is a whole multiple of 8 MHz, so every time above is a whole count.
+  function automatic int unsigned clocks(int unsigned ns, int unsigned clk_hz);
+    return int'((longint'(ns) * longint'(clk_hz)) / 64'd1_000_000_000);
+  endfunction
+endpackage

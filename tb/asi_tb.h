@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/**
+ * @file asi_tb.h  C interface of the native simulation: simulated slaves on a line, and the Verilated chip with them.
+ * Used from Python through cffi (host/python/asi/native.py, which reads the declarations between the cffi markers).
+ * Units: times in ns of bus time since reset (int64_t); indices as in docs/architecture.md (number + 32 * Sel).
+ * Errors: functions returning int give 0 or a count on success, a negative number on failure.
+ */
+#ifndef ASI_TB_H
+#define ASI_TB_H
+#include <stddef.h>
+#include <stdint.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+/* cffi begin */
+typedef struct asi_net asi_net;    /* slaves on one line */
+typedef struct asi_chip asi_chip;  /* Verilated asi_master with an asi_net on its pins */
+
+typedef struct { int64_t t_ns; int32_t width_ns; int32_t polarity; } asi_pulse;  /* polarity -1 or +1 */
+
+/* what a slave is; address as index, 0 allowed */
+typedef struct {
+    uint8_t address, io, id, id1, id2;
+    uint8_t inputs;       /* input nibble, line level = host level */
+    uint8_t watchdog;     /* 1: resets itself after 94.2 ms without DEXG or WPAR */
+    uint8_t present;      /* 0: not (yet) connected */
+} asi_slave_cfg;
+
+/* what a slave shows */
+typedef struct {
+    uint8_t address, outputs, parameter, dexg_disabled, synchronous, present, status, reserved;
+    uint32_t requests, answers;
+} asi_slave_state;
+
+/* faults of one slave's answers; probabilities in 1/65536 per answer, all may be active together */
+typedef struct {
+    uint16_t p_no_answer, p_parity, p_missing_pulse, p_shifted_pulse, p_extra_pulse;
+    int32_t  shift_ns;     /* shift used by p_shifted_pulse, e.g. -2000 .. 2000 */
+    int32_t  delay_ns;     /* added to every answer's start */
+} asi_slave_faults;
+
+asi_net *asi_net_new(uint64_t seed);
+void     asi_net_free(asi_net *net);
+int      asi_net_add(asi_net *net, const asi_slave_cfg *cfg);                  /* -> slave handle >= 0 */
+int      asi_net_set_inputs(asi_net *net, int slave, uint8_t inputs);
+int      asi_net_set_present(asi_net *net, int slave, uint8_t present);        /* 1 after 0 = power-up reset */
+int      asi_net_set_periphery_fault(asi_net *net, int slave, uint8_t fault);  /* status bit S1 */
+int      asi_net_set_faults(asi_net *net, int slave, const asi_slave_faults *faults);
+int      asi_net_get(const asi_net *net, int slave, asi_slave_state *state);
+int      asi_net_power(asi_net *net, uint8_t good);                            /* 0: all slaves lose power */
+/* without a chip: a pulse of the master; then advance to t_ns and collect the slaves' pulses that start until then */
+int      asi_net_master_pulse(asi_net *net, int64_t t_ns, int32_t polarity);
+int      asi_net_advance(asi_net *net, int64_t t_ns, asi_pulse *out, int max);
+
+/* one call on the line as the passive monitor (independent of the chip) saw it */
+typedef struct {
+    int64_t  t_ns;         /* first pulse of the request */
+    int32_t  delay_ns;     /* last request pulse to first answer pulse, -1 without answer */
+    uint16_t call;         /* CB A4..A0 I4..I0 */
+    uint8_t  error_class;  /* error_class_e of the answer */
+    uint8_t  data;         /* answer nibble, valid when error_class is OK */
+    uint8_t  phase;        /* phase_e when the request began */
+    uint8_t  repeated;     /* 1: immediate repetition of the call before */
+    uint8_t  request_ok;   /* 0: the request itself was not a legal telegram */
+    uint8_t  reserved;
+} asi_telegram;
+
+typedef struct {
+    uint64_t clocks, telegrams, repeated, failed;
+    int64_t  phase_ns[8];                  /* bus time spent with phase_o = n */
+    uint64_t cycles;
+    int64_t  cycle_min_ns, cycle_max_ns, cycle_sum_ns;      /* between sync_o pulses; sum over cycles-1 periods */
+    uint64_t irq_count, irq_clocks_max;    /* core busy between leaving and re-entering WAIT, worst case */
+} asi_chip_stats;
+
+asi_chip *asi_chip_new(const char *wave_path, uint64_t seed);  /* NULL: no waves; NULL on failure */
+void      asi_chip_free(asi_chip *chip);                       /* closes the waveform */
+asi_net  *asi_chip_net(asi_chip *chip);
+uint32_t  asi_chip_clk_hz(const asi_chip *chip);
+int64_t   asi_chip_time(const asi_chip *chip);
+int64_t   asi_chip_run(asi_chip *chip, int64_t until_ns);      /* -> time reached */
+int64_t   asi_chip_run_irq(asi_chip *chip, int64_t until_ns);  /* as run, stops when host_irq_o is high */
+uint32_t  asi_chip_host_read(asi_chip *chip, uint32_t byte_addr);                       /* a real bus cycle */
+void      asi_chip_host_write(asi_chip *chip, uint32_t byte_addr, uint32_t data, uint8_t byte_enable);
+void      asi_chip_apf(asi_chip *chip, uint8_t low);           /* pin apf_ni; the slaves follow asi_net_power */
+int       asi_chip_log(asi_chip *chip, asi_telegram *out, int max);                     /* drains, -> count */
+void      asi_chip_get_stats(asi_chip *chip, asi_chip_stats *out);
+/* cffi end */
+#ifdef __cplusplus
+}
+#endif
+#endif
