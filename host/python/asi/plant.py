@@ -117,6 +117,7 @@ class Host:
     outputs: dict[int, int] = field(default_factory=dict)     # nibbles at time 0, 0 where not named
     data_exchange: bool = True
     auto_address: bool = False
+    names: dict[int, str] = field(default_factory=dict)       # of slaves that are projected only
 
 
 @dataclass(frozen=True)
@@ -166,6 +167,10 @@ class Plant:
         """True when the plant or the projection has an A/B slave on this number."""
         return number in self._extended_numbers
 
+    def name_of(self, index: int) -> str:
+        """Index -> '5', '5A' or '5B' as this plant uses the number."""
+        return address_name(index, self.extended(index & 31))
+
     @cached_property
     def _extended_numbers(self) -> frozenset[int]:
         indices = [s.index for s in self.slaves if s.codes.extended and s.index]
@@ -183,6 +188,11 @@ class Plant:
 def address_name(index: int, extended: bool) -> str:
     """Index -> '5', '5A', '5B'; extended: the number is used with A/B addressing."""
     return index_name(index) + ("A" if extended and 0 < index < 32 else "")
+
+
+def line_order(index: int) -> tuple[int, int]:
+    """Sort key: by number, A before B."""
+    return index & 31, index >> 5
 
 
 # ---------------------------------------------------------------- values
@@ -309,6 +319,7 @@ class _Slave(_Codes):
 
 
 class _Extra(_Codes):
+    name: Name | None = None
     address: Address
 
 
@@ -533,15 +544,18 @@ class _Builder:
                                   f"{' (use host.extra)' if key == 'projected' else ''}")
         for index in sorted(wanted - host.not_projected):
             pcd[index] = known[index]
-        extra = set()
+        extra, names = set(), {}
         for number, table in enumerate(host.extra, 1):
             index = parse_index(table.address)
             if not index or index in extra:
                 raise _Fault(f"extra #{number}.address", "address 0 cannot be projected" if not index else "used twice")
             extra.add(index)
-            codes = self.guard(f"host.extra #{number}", lambda t=table, i=index: _codes(t, i))
+            key = _item("host.extra", number, table.name)
+            codes = self.guard(key, lambda t=table, i=index: _codes(t, i))
             if codes is not None:
                 pcd[index] = codes
+            if table.name:
+                names[index] = table.name
         parameters = {}
         for text, nibble in host.parameters.items():
             index = _with_key(f"parameters.{_show(text)}", lambda t=text: parse_index(t))
@@ -564,7 +578,8 @@ class _Builder:
             if table.values and table.values[0].at == 0:
                 outputs[index] = table.values[0].value
             self.series(table.values, table.repeat, "output", (), lambda nibble, i=index: (i, nibble))
-        return Host(host.mode == "protected", pcd, parameters, outputs, host.data_exchange, host.auto_address)
+        return Host(host.mode == "protected", pcd, parameters, outputs, host.data_exchange, host.auto_address,
+                    names)
 
     def check(self, table: _Expect, time_ns: int) -> Check:
         inputs = {_with_key(f"inputs.{_show(text)}", lambda t=text: parse_index(t)): nibble
