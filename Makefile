@@ -36,6 +36,23 @@ setup: $(VENV)/.ready  ## virtual environment with the pinned packages
 regs: $(VENV)/.ready  ## regenerate everything that comes from rdl/asi.rdl, and the HTML register reference
 	@$(VPY) tools/gen_registers.py --html $(BUILD)/registers
 
+# ---------------------------------------------------------------- run
+PLANT ?= sim/plants/packaging.toml
+RUN_LIB = $(BUILD)/tb/libasi_chip$(if $(filter 1,$(WAVES)),_trace).so
+.PHONY: run
+run: $(VENV)/.ready $(RUN_LIB) $(BUILD)/firmware/asi$(if $(filter 1,$(QUICK)),_test).hex  ## run a plant: make run PLANT=... TIME=1200ms WAVES=1 QUICK=1
+	@$(VPY) -m asi run $(PLANT) $(if $(TIME),--time $(TIME)) $(if $(filter 1,$(WAVES)),--waves) \
+	  $(if $(filter 1,$(QUICK)),--quick) $(RUN_ARGS)
+
+# ---------------------------------------------------------------- requirement matrix, waveform view
+.PHONY: matrix
+matrix: $(VENV)/.ready  ## docs/verification.md: which tests name which requirement, and the gaps
+	@$(VPY) tools/matrix.py
+
+.PHONY: views
+views: $(VENV)/.ready  ## regenerate sim/views/asi.gtkw
+	@$(VPY) tools/gtkw.py
+
 # ---------------------------------------------------------------- clean
 .PHONY: clean
 clean:  ## remove build results, keep the environment

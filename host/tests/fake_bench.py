@@ -6,7 +6,7 @@ It is no model of the master: detection takes no time, a lost slave is gone with
 from types import SimpleNamespace
 
 from asi import regmap
-from asi.plant import Codes, Faults
+from asi.plant import Faults
 from asi.regmap import ErrorClass, Phase
 from asi.telegram import encode_call
 from asi.window import INDICES, MAGIC
@@ -51,8 +51,8 @@ class FakeBench:
     def stats(self):
         times = self.cycle_times
         return SimpleNamespace(
-            clocks=self.now * 16 // 1000, cycles=self.cycles, cycle_min_ns=min(times, default=0),
-            cycle_max_ns=max(times, default=0), cycle_sum_ns=sum(times), irq_count=self.cycles, irq_clocks_max=1234,
+            clocks=self.now * 16 // 1000, cycles=self.cycles, cycle_periods=len(times),
+            cycle_min_ns=min(times, default=0), cycle_max_ns=max(times, default=0), cycle_sum_ns=sum(times), irq_count=self.cycles, irq_clocks_max=1234,
             phase_ns=[self.settle_ns, 0, 0, sum(times), 0, 0, 0, 0])
 
     def add(self, slave):
@@ -166,5 +166,3 @@ class FakeBench:
         for name, value in (("SENT", self.sent), ("CYCLES", self.cycles), ("FAILED", self.failed)):
             self._put(getattr(regmap, f"HOST_{name}"), value)
 
-
-CODES = Codes(0, 0, 15, 15)

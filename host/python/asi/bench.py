@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""asi.native.Chip seen as the runner wants it (asi.run.Bench): slaves, line power and host port of one simulated chip."""
+"""asi.native.Chip seen as the runner wants it (asi.run.Bench): slaves, line power and host port of one chip."""
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ class NativeBench:
         self.chip, self.net, self.clk_hz = chip, chip.net, chip.clk_hz
 
     def time(self) -> int:
-        return self.chip.time
+        return self.chip.time_ns
 
     def run(self, until_ns: int) -> int:
         return self.chip.run(until_ns)
@@ -63,16 +63,19 @@ class NativeBench:
         self.chip.close()
 
 
-def open_bench(seed: int, wave_path: Path | None) -> NativeBench:
+def open_bench(firmware: Path, waves: Path | None, seed: int) -> NativeBench:
     """A chip in reset state at time 0; BenchError when the native libraries are not there or fail."""
     from asi import native  # only here: plants and reports need no simulator
+    if not firmware.is_file():
+        raise BenchError(f"{firmware} is missing: make firmware")
     try:
-        return NativeBench(native.Chip(seed=seed, wave_path=wave_path))
+        return NativeBench(native.Chip(firmware=firmware, waves=waves, seed=seed))
     except (OSError, RuntimeError) as error:
         raise BenchError(str(error)) from None
 
 
-def wave_suffix() -> str:
-    """.fst or .vcd, as the tracing library was built."""
-    from asi import native
-    return native.wave_suffix()
+def name_waves(path: Path) -> Path:
+    """Give a finished wave file the suffix of what is in it: .vcd or .fst (the build decides). -> the new path."""
+    with open(path, "rb") as file:
+        suffix = ".vcd" if file.read(1) == b"$" else ".fst"
+    return path.replace(path.with_suffix(suffix))

@@ -13,12 +13,15 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from asi import report
-from asi.bench import BenchError, open_bench, wave_suffix
-from asi.plant import Plant, PlantError, load_plant, parse_time
+from asi.bench import BenchError, name_waves, open_bench
+from asi.plant import SETTLE_NS, Plant, PlantError, load_plant, parse_time
 from asi.run import Runner
 
 OK, NOT_MET, BAD_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 EXIT_CODES = {"ok": OK, "expectation not met": NOT_MET, "failed": FAILED, "interrupted": INTERRUPTED}
+
+FIRMWARE = Path("build/firmware")
+QUICK_SETTLE_NS = 20_000_000  # P_PWR_SETTLE of asi_test.hex
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="Tools of the open AS-Interface master.")
@@ -90,21 +93,25 @@ class _Bar:
 @app.command()
 def run(
     plant: Annotated[Path, typer.Argument(help="Plant file, e.g. sim/plants/packaging.toml.", show_default=False)],
-    time: Annotated[int | None, typer.Option("--time", "-t", parser=_time, metavar="TIME", show_default=False,
-                                             help="Bus time to run, e.g. 500ms; default: the plant's duration.")] = None,
-    waves: Annotated[bool, typer.Option("--waves", help="Write a waveform (slow; view with sim/views/asi.gtkw).")] = False,
+    time: Annotated[int | None, typer.Option(
+        "--time", "-t", parser=_time, metavar="TIME", show_default=False,
+        help="Bus time to run, e.g. 1200ms; default: the plant's duration.")] = None,
+    waves: Annotated[bool, typer.Option("--waves", help="Write a waveform (slow; see sim/views/asi.gtkw).")] = False,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for report, logs and waves.")] = Path("build/run"),
     log: Annotated[bool, typer.Option(help="Write telegrams.log and telegrams.jsonl.")] = True,
-    seed: Annotated[int | None, typer.Option(min=0, max=2**63 - 1, show_default=False,
-                                             help="Random seed of the faults; default: the plant's.")] = None,
-    settle: Annotated[int | None, typer.Option("--settle", parser=_time, metavar="TIME", show_default=False,
-                                               help="Settle time of the firmware image, if it is not the product's "
-                                                    "1s; the plant's times move with it.")] = None,
+    seed: Annotated[int | None, typer.Option(
+        min=0, max=2**63 - 1, show_default=False, help="Random seed of the faults; default: the plant's.")] = None,
+    quick: Annotated[bool, typer.Option(
+        "--quick", help="Test firmware: waits 20 ms instead of 1 s after power-up; the plant's times move.")] = False,
+    firmware: Annotated[Path | None, typer.Option(
+        show_default=False, help="Another firmware image; say its settle time with --settle.")] = None,
+    settle: Annotated[int | None, typer.Option(
+        "--settle", parser=_time, metavar="TIME", show_default=False, help="Settle time of that image.")] = None,
 ) -> None:
     """Run a plant on the simulated master and report what happened."""
     described = _load(plant)
-    if settle is not None:
-        described = described.with_settle(settle)
+    settle_ns = settle if settle is not None else QUICK_SETTLE_NS if quick else SETTLE_NS
+    described = described.with_settle(settle_ns)
     until_ns = described.duration_ns if time is None else time
     if until_ns == 0:
         raise _fail("--time: nothing to run", BAD_INPUT)
@@ -116,20 +123,24 @@ def run(
     if not console.is_terminal:
         console = Console(highlight=False, width=120)  # a file or a pipe has no width of its own
     console.print(Text(" ".join(described.description.split()), style="dim"))
-    wave_path = out / f"waves{wave_suffix()}" if waves else None
+    if until_ns <= settle_ns:
+        console.print(f"note: the line stays quiet until {report.us(settle_ns)}, the wait after power-up")
+    wave_path = out / "waves.part" if waves else None
+    image = firmware or FIRMWARE / ("asi_test.hex" if quick else "asi.hex")
+    files = ["report.json", *(["telegrams.log", "telegrams.jsonl"] if log else [])]
     try:
-        bench = open_bench(described.seed if seed is None else seed, wave_path)
+        bench = open_bench(image, wave_path, described.seed if seed is None else seed)
     except BenchError as error:
         raise _fail(f"simulation: {error}", FAILED) from None
     try:
         with (_Bar if console.is_terminal else _Lines)(console) as progress:
             result = Runner(described, bench, out, until_ns, log=log, progress=progress).run()
+        bench.close()
+        if wave_path is not None:
+            files.append(name_waves(wave_path).name)
     except OSError as error:
         raise _fail(f"{out}: {error.strerror}", FAILED) from None
-    finally:
-        bench.close()
     report.show(result, console)
-    files = ["report.json", *(["telegrams.log", "telegrams.jsonl"] if log else []), *([wave_path.name] if waves else [])]
     console.print(Text(f"written: {', '.join(str(out / name) for name in files)}", style="dim"), soft_wrap=True)
     for check in result["checks"]:
         for difference in check["differences"]:

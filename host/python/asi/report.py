@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a run: one plain dict (docs/report.md), written as JSON and shown on the terminal from the same dict."""
+"""The report of a run: one plain dict (docs/report.md), written as JSON and shown on the terminal from that dict."""
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,7 +41,7 @@ def build(runner: "Runner", counts: Counts, *, wall_s: float, interrupted: bool,
     failed = any(check["result"] == "not met" for check in checks)
     result = ("failed" if error else "interrupted" if interrupted else "expectation not met" if failed else "ok")
     lists = {name: sorted(getattr(state, name), key=line_order) for name in LISTS}
-    cycles = stats.cycles
+    timed = stats.cycle_periods > 0
     return {
         "schema": SCHEMA,
         "result": result,
@@ -58,9 +58,9 @@ def build(runner: "Runner", counts: Counts, *, wall_s: float, interrupted: bool,
         },
         "slaves": _slaves(plant, state, inputs, outputs, detected, counts),
         "cycles": {
-            "count": cycles, "min_ns": stats.cycle_min_ns if cycles > 1 else None,
-            "mean_ns": stats.cycle_sum_ns // (cycles - 1) if cycles > 1 else None,
-            "max_ns": stats.cycle_max_ns if cycles > 1 else None,
+            "count": stats.cycles, "min_ns": stats.cycle_min_ns if timed else None,
+            "mean_ns": stats.cycle_sum_ns // stats.cycle_periods if timed else None,
+            "max_ns": stats.cycle_max_ns if timed else None,
         },
         "telegrams": {
             **_tally(counts.total), "bad_requests": counts.broken_requests,
@@ -177,8 +177,8 @@ def _slave_table(rows: list[dict[str, Any]]) -> Table:
         lists = " ".join(name.upper() for name in LISTS if row[name])
         bad = row["lps"] != row["las"] or (row["index"] == 0 and row["lds"])
         name = row["name"] or ("-" if row["address"] else "addresses without a slave")
-        table.add_row(row["address"] or "other", Text(name), profile, Text(lists, style="yellow" if bad else "green"), row["inputs"] or "",
-                      row["outputs"] or "", str(row["requests"]), str(row["failed"]), str(row["repeated"]))
+        table.add_row(row["address"] or "other", Text(name), profile, Text(lists, style="yellow" if bad else "green"),
+                      row["inputs"] or "", row["outputs"] or "", str(row["requests"]), str(row["failed"]), str(row["repeated"]))
     return table
 
 

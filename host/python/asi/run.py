@@ -68,7 +68,7 @@ def compare(check: Check, state: State, inputs: list[int] | None, cycle_max_ns: 
         if not cycle_max_ns:
             out.append("no cycle was measured")
         elif cycle_max_ns > check.cycle_max_ns:
-            out.append(f"longest cycle {cycle_max_ns / 1000:.3f} us, expected at most {check.cycle_max_ns / 1000:.3f} us")
+            out.append(f"longest cycle {report.us(cycle_max_ns)}, expected at most {report.us(check.cycle_max_ns)}")
     return out
 
 
@@ -103,7 +103,8 @@ class Runner:
             except (SimulationError, WindowError) as fault:
                 error = str(fault)
             log.add(self.bench.telegrams())
-            out = report.build(self, log.counts, wall_s=time.monotonic() - started, interrupted=interrupted, error=error)
+            wall_s = time.monotonic() - started
+            out = report.build(self, log.counts, wall_s=wall_s, interrupted=interrupted, error=error)
         report.write(out, self.folder / "report.json")
         return out
 

@@ -76,8 +76,8 @@ class HostWindow:
         """Flags, phase, lists and counters."""
         read = self.port.host_read
         return State(self.flags(), Phase(read(regmap.HOST_PHASE)), self.index_list(regmap.HOST_LDS),
-                     self.index_list(regmap.HOST_LAS), self.index_list(regmap.HOST_LPS), self.index_list(regmap.HOST_LPF),
-                     {name: read(getattr(regmap, f"HOST_{name.upper()}")) for name in COUNTERS})
+                     self.index_list(regmap.HOST_LAS), self.index_list(regmap.HOST_LPS),
+                     self.index_list(regmap.HOST_LPF), {name: read(getattr(regmap, f"HOST_{name.upper()}")) for name in COUNTERS})
 
     def inputs(self) -> list[int]:
         """The input image, 64 nibbles of one cycle (HW-003); WindowError when it never holds still."""
@@ -119,7 +119,7 @@ class HostWindow:
         self.port.host_write(regmap.HOST_IRQ_ACK, 1, 15)
 
     def set_control(self, **bits: bool) -> int:
-        """Change bits of HOST_CTRL (protected_mode, offline, data_exchange, auto_address_enable) and commit -> sequence."""
+        """Change bits of HOST_CTRL (protected_mode, offline, data_exchange, auto_address_enable); -> sequence."""
         for name, on in bits.items():
             bit = 1 << getattr(regmap, f"HOST_CTRL_{name.upper()}_LSB")
             self.control = self.control | bit if on else self.control & ~bit
