@@ -4,6 +4,7 @@
 Exit codes: 0 everything as the plant expects, 1 an expectation was not met, 2 bad input (plant, option),
 3 the simulation failed, 130 stopped by Ctrl-C (the report so far is written).
 """
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -112,6 +113,8 @@ def run(
     described = _load(plant)
     settle_ns = settle if settle is not None else QUICK_SETTLE_NS if quick else SETTLE_NS
     described = described.with_settle(settle_ns)
+    if seed is not None:
+        described = replace(described, seed=seed)
     until_ns = described.duration_ns if time is None else time
     if until_ns == 0:
         raise _fail("--time: nothing to run", BAD_INPUT)
@@ -129,7 +132,7 @@ def run(
     image = firmware or FIRMWARE / ("asi_test.hex" if quick else "asi.hex")
     files = ["report.json", *(["telegrams.log", "telegrams.jsonl"] if log else [])]
     try:
-        bench = open_bench(image, wave_path, described.seed if seed is None else seed)
+        bench = open_bench(image, wave_path, described.seed)
     except BenchError as error:
         raise _fail(f"simulation: {error}", FAILED) from None
     try:

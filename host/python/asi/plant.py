@@ -549,7 +549,8 @@ class _Builder:
         for number, table in enumerate(host.extra, 1):
             index = parse_index(table.address)
             if not index or index in extra:
-                raise _Fault(f"extra #{number}.address", "address 0 cannot be projected" if not index else "used twice")
+                raise _Fault(f"{_item('extra', number, table.name)}.address",
+                             "used twice" if index else "address 0 cannot be projected")
             extra.add(index)
             key = _item("host.extra", number, table.name)
             codes = self.guard(key, lambda t=table, i=index: _codes(t, i))
