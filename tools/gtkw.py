@@ -43,8 +43,7 @@ def render() -> str:
 def missing(waves: Path) -> list[str]:
     """Signals of the view that the wave file does not have (bit ranges are not compared)."""
     import pywellen
-    hierarchy = pywellen.Waveform(str(waves)).hierarchy
-    there = {var.full_name(hierarchy).split("[")[0].strip() for var in hierarchy.all_vars()}
+    there = {var.full_name.split("[")[0].strip() for var in pywellen.Waveform(str(waves)).all_vars()}
     names = (f"{TOP}.{name}".split("[")[0] for signals in VIEW.values() for name, _ in signals)
     return [name for name in dict.fromkeys(names) if name not in there]
 

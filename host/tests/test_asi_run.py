@@ -225,7 +225,8 @@ def test_world_events_reach_the_bench(tmp_path):
     """PL-004: inputs, faults, power and the power fail pin arrive at the right slave at the right time."""
     story = ""
     for at, do, more in ((1020, "inputs", 'slave = "1"\nvalue = "1000"'),
-                         (1030, "noise", 'slave = "2B"\nno_answer = 1'), (1040, "quiet", 'slave = "all"'), (1050, "power_off", ""), (1060, "power_on", ""),
+                         (1030, "noise", 'slave = "2B"\nno_answer = 1'), (1040, "quiet", 'slave = "all"'),
+                         (1050, "power_off", ""), (1060, "power_on", ""),
                          (1070, "apf_low", ""), (1080, "apf_high", ""), (1090, "periphery_fault", 'slave = "Two"'),
                          (1095, "periphery_ok", 'slave = "Two"')):
         story += f'[[event]]\nat = "{at}ms"\ndo = "{do}"\n{more}\n'
@@ -398,8 +399,9 @@ def test_bad_plant_lines(asi, tmp_path):
     path = written(tmp_path, SMALL.replace('"2B"\n', '"42"\n').replace('duration = "1100ms"', ""))
     code, out, err = asi("run", path)
     assert (code, out) == (2, "")
-    assert err.splitlines() == [f"{path}: duration: missing",
-                                f"{path}: slave #2 (Two).address: '42' is not an AS-i address (0, 1..31, 1A..31A, 1B..31B)"]
+    assert err.splitlines() == [
+        f"{path}: duration: missing",
+        f"{path}: slave #2 (Two).address: '42' is not an AS-i address (0, 1..31, 1A..31A, 1B..31B)"]
 
 
 def test_exit_3(asi, tmp_path):

@@ -178,7 +178,8 @@ def _slave_table(rows: list[dict[str, Any]]) -> Table:
         bad = row["lps"] != row["las"] or (row["index"] == 0 and row["lds"])
         name = row["name"] or ("-" if row["address"] else "addresses without a slave")
         table.add_row(row["address"] or "other", Text(name), profile, Text(lists, style="yellow" if bad else "green"),
-                      row["inputs"] or "", row["outputs"] or "", str(row["requests"]), str(row["failed"]), str(row["repeated"]))
+                      row["inputs"] or "", row["outputs"] or "",
+                      *(str(row[key]) for key in ("requests", "failed", "repeated")))
     return table
 
 

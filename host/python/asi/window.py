@@ -77,7 +77,8 @@ class HostWindow:
         read = self.port.host_read
         return State(self.flags(), Phase(read(regmap.HOST_PHASE)), self.index_list(regmap.HOST_LDS),
                      self.index_list(regmap.HOST_LAS), self.index_list(regmap.HOST_LPS),
-                     self.index_list(regmap.HOST_LPF), {name: read(getattr(regmap, f"HOST_{name.upper()}")) for name in COUNTERS})
+                     self.index_list(regmap.HOST_LPF),
+                     {name: read(getattr(regmap, f"HOST_{name.upper()}")) for name in COUNTERS})
 
     def inputs(self) -> list[int]:
         """The input image, 64 nibbles of one cycle (HW-003); WindowError when it never holds still."""
