@@ -14,21 +14,22 @@ constexpr size_t kLogMax = 1 << 20;                // records kept for a reader 
 }  // namespace
 
 ErrorClass check_telegram(const std::vector<Pulse> &pulses, int bits, unsigned &word) {
-    const int64_t end = (bits - 1) * kBit;
+    const int end_window = 2 * (bits - 1);
     const int64_t first = pulses.front().t;
-    bool alternation = false, timing = false, length = false, ended = false;
+    bool alternation = false, timing = false, length = false;
+    int window = 0;                // of the last pulse that was in one
     uint32_t found = 1, ones = 0;  // per bit: a pulse was there; it was positive
     for (size_t i = 1; i < pulses.size(); i++) {
-        const int64_t d = pulses[i].t - first;
-        if (ended || d > end + kWinLate) { length = true; continue; }
-        alternation |= pulses[i].polarity == pulses[i - 1].polarity;
-        const int n = window_of(d);
-        if (n < 1) { timing = true; continue; }
+        if (window == end_window) { length = true; continue; }  // after the end pulse nothing else matters
+        if (pulses[i].t == pulses[i - 1].t) { timing = true; continue; }  // two senders; the first stands for both
+        const size_t before = i >= 2 && pulses[i - 1].t == pulses[i - 2].t ? i - 2 : i - 1;
+        alternation |= pulses[i].polarity == pulses[before].polarity;
+        const int n = window_of(pulses[i].t - first);
+        if (n <= window || n > end_window) { timing = true; continue; }  // dead zone, second one, too late
+        window = n;
         if (n % 2 == 0) {
-            const uint32_t bit = 1u << (n / 2);
-            if (!(found & bit) && pulses[i].polarity > 0) ones |= bit;
-            found |= bit;
-            ended = n == 2 * (bits - 1);
+            found |= 1u << (n / 2);
+            if (pulses[i].polarity > 0) ones |= 1u << (n / 2);
         }
     }
     word = 0;

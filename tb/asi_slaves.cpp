@@ -279,8 +279,10 @@ void asi_net::put(const Pulse &pulse) {
             i++;
         }
     }
-    // sorted by falling start; at equal starts the order of arrival is kept
-    const auto at = std::find_if(queue_.begin(), queue_.end(), [&](const Pulse &q) { return q.t <= p.t; });
+    // sorted by falling start; at equal starts the positive one comes out first
+    const auto at = std::find_if(queue_.begin(), queue_.end(), [&](const Pulse &q) {
+        return q.t < p.t || (q.t == p.t && q.polarity > p.polarity);
+    });
     queue_.insert(at, p);
 }
 

@@ -13,3 +13,5 @@ ASI_CLK_HZ ?= 16000000
 $(TB_OUT)/libasi_slaves.so: $(TB_SLAVES) $(TB_HEADERS)
 	@mkdir -p $(@D)
 	$(TB_CXX) $(TB_FLAGS) -shared $(TB_SLAVES) -o $@
+
+pytest: $(TB_OUT)/libasi_slaves.so

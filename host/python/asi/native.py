@@ -112,7 +112,8 @@ class Net:
 
     def __init__(self, seed=0, *, _chip=None):
         if _chip:
-            self._ffi, self._lib, self._net, self._owner = _chip._ffi, _chip._lib, _chip._lib.asi_chip_net(_chip._chip), _chip
+            self._ffi, self._lib, self._chip = _chip._ffi, _chip._lib, _chip  # keeps the chip alive
+            self._net = self._lib.asi_chip_net(_chip._chip)
         else:
             self._ffi, self._lib = load("asi_slaves")
             self._net = self._ffi.gc(self._lib.asi_net_new(seed), self._lib.asi_net_free)
