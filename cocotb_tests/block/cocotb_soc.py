@@ -137,7 +137,7 @@ async def access_to_nothing(dut):
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
 async def new_code_is_fetched(dut):
-    """HW-007: code written by the data side runs, also where the instruction side has read ahead."""
+    """HW-007: code written by the data side runs, also a few words ahead of the store itself."""
     tb = TB(dut)
     await tb.start()
     for value in (1, 2, 3):
