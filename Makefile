@@ -48,3 +48,9 @@ clean:  ## remove build results, keep the environment
 .PHONY: pytest
 pytest: $(VENV)/.ready  ## run some tests: make pytest ARGS='cocotb_tests/block -k sync'
 	@$(VPY) -m pytest $(ARGS)
+
+# ---------------------------------------------------------------- test
+.PHONY: test
+test: $(VENV)/.ready  ## everything, with one closing line of counts; JUnit and coverage in build/test
+	@rm -rf $(BUILD)/coverage-*.dat $(BUILD)/firmware/coverage && mkdir -p $(BUILD)/test
+	@RTL_COVERAGE=1 $(VPY) -m pytest -n 2 --dist loadfile --junitxml=$(BUILD)/test/junit.xml
