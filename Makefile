@@ -36,9 +36,6 @@ setup: $(VENV)/.ready  ## virtual environment with the pinned packages
 regs: $(VENV)/.ready  ## regenerate everything that comes from rdl/asi.rdl, and the HTML register reference
 	@$(VPY) tools/gen_registers.py --html $(BUILD)/registers
 
-# ---------------------------------------------------------------- native simulation
-include tb/tb.mk
-
 # ---------------------------------------------------------------- lint, synthesis
 VEXRISCV := $(abspath $(VENV))/lib/$(PYDIR)/site-packages/pythondata_cpu_vexriscv/verilog/VexRiscv_Min.v
 # smallest, default and largest parameters: a width that slips shows at one of them
@@ -53,6 +50,9 @@ lint: $(VENV)/.ready  ## Verilator -Wall over the whole chip, three parameter se
 .PHONY: synth
 synth: $(VENV)/.synth  ## cells and clock rate on iCE40 UP5K and ECP5-25F (minutes), table and build/synth/numbers.json
 	@$(VPY) syn/synth.py --vexriscv $(VEXRISCV) --out $(BUILD)/synth $(ARGS)
+
+# ---------------------------------------------------------------- native simulation
+include tb/tb.mk
 
 # ---------------------------------------------------------------- clean
 .PHONY: clean
