@@ -316,6 +316,7 @@ static event_t detection_next(asi_ec_t *ec, const asi_result_t *results)
         for (unsigned i = asi_list_next(&ec->todo, 0u); i < ASI_INDICES; i = asi_list_next(&ec->todo, i + 1u))
             enter_lds(ec, i, ec->codes[i]);
         ec->todo = ASI_LIST_EMPTY;
+        update_flags(ec);
     } else {
         ec->step++;
     }
@@ -328,7 +329,6 @@ static event_t detection_next(asi_ec_t *ec, const asi_result_t *results)
         detection_batch(ec);
         return EV_NONE;
     }
-    update_flags(ec);
     return asi_list_is_empty(&ec->state.lds) ? EV_NOBODY : EV_FOUND;
 }
 
