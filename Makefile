@@ -36,6 +36,9 @@ setup: $(VENV)/.ready  ## virtual environment with the pinned packages
 regs: $(VENV)/.ready  ## regenerate everything that comes from rdl/asi.rdl, and the HTML register reference
 	@$(VPY) tools/gen_registers.py --html $(BUILD)/registers
 
+# ---------------------------------------------------------------- firmware
+include firmware/firmware.mk
+
 # ---------------------------------------------------------------- clean
 .PHONY: clean
 clean:  ## remove build results, keep the environment

@@ -38,6 +38,9 @@
 #define ASI_EMPTY_CYCLE_US 1000u
 #endif
 
+/** P_FAIL_CYCLES, cycles: the sequencer's limit of failed cycles in a row, SLOT_STATE.streak of a lost slave (LK-004). */
+#define ASI_FAIL_CYCLES 3u
+
 _Static_assert(ASI_CMD_RETRY <= 3u, "the request word has two bits for repetitions");
 _Static_assert(ASI_EXTRA_CALLS == 1 || ASI_EXTRA_CALLS == 2, "one or two extra slots");
 _Static_assert(ASI_INCL_MISS >= 1u && ASI_INCL_MISS <= 255u, "kept in a byte");
