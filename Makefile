@@ -54,6 +54,9 @@ synth: $(VENV)/.synth  ## cells and clock rate on iCE40 UP5K and ECP5-25F (minut
 # ---------------------------------------------------------------- native simulation
 include tb/tb.mk
 
+# ---------------------------------------------------------------- firmware
+include firmware/firmware.mk
+
 # ---------------------------------------------------------------- clean
 .PHONY: clean
 clean:  ## remove build results, keep the environment
