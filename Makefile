@@ -69,7 +69,7 @@ pytest: $(VENV)/.ready  ## run some tests: make pytest ARGS='cocotb_tests/block 
 
 # ---------------------------------------------------------------- test
 .PHONY: test
-test: $(VENV)/.ready  ## everything, with one closing line of counts; JUnit and coverage in build/test
+test: $(VENV)/.ready $(BUILD)/tb/libasi_chip.so $(BUILD)/firmware/asi_test.hex  ## everything, with one closing line of counts; JUnit and coverage in build/test
 	@rm -rf $(BUILD)/coverage-*.dat $(BUILD)/firmware/coverage && mkdir -p $(BUILD)/test
 	@RTL_COVERAGE=1 $(VPY) -m pytest -n 2 --dist loadfile --junitxml=$(BUILD)/test/junit.xml
 

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The shipped plants on the whole chip, firmware included (test image: 20 ms after power-up instead of 1 s).
+
+Needs build/tb/libasi_chip.so and build/firmware/asi_test.hex; `make test` builds both.
+"""
+import json
+from pathlib import Path
+
+import pytest
+
+from asi.bench import open_bench
+from asi.cli import QUICK_SETTLE_NS
+from asi.plant import load_plant
+from asi.run import Runner
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module", params=sorted((ROOT / "sim/plants").glob("*.toml")), ids=lambda path: path.stem)
+def ran(request, tmp_path_factory):
+    """-> (plant, report, records of the telegram log) of one run."""
+    plant = load_plant(request.param).with_settle(QUICK_SETTLE_NS)
+    folder = tmp_path_factory.mktemp(request.param.stem)
+    bench = open_bench(ROOT / "build/firmware/asi_test.hex", None, plant.seed)
+    try:
+        result = Runner(plant, bench, folder).run()
+    finally:
+        bench.close()
+    with open(folder / "telegrams.jsonl", encoding="utf-8") as file:
+        return plant, result, [json.loads(line) for line in file]
+
+
+def test_plants_keep_their_promise(ran):
+    """PL-004: every check and the final expectation of the plant are met on the whole chip."""
+    plant, result, _ = ran
+    assert result["error"] is None
+    assert [check["differences"] for check in result["checks"]] == [[] for _ in plant.checks]
+    assert result["result"] == "ok"
+
+
+def test_monitor_and_master_count_the_same(ran):
+    """PL-002, HW-004: the counters in the host window follow the line as the passive monitor sees it, up to one cycle."""
+    plant, result, records = ran
+    requests, sent = result["telegrams"]["requests"], result["master"]["sent"]
+    assert len(records) == requests and sent <= requests <= sent + 2 * 33  # a cycle: 31 calls and an extra, repeated
+    assert 0 <= result["telegrams"]["repeated"] - result["master"]["repeated"] <= 33
+    assert 0 <= result["cycles"]["count"] - result["master"]["cycles"] <= 2
+    assert result["telegrams"]["bad_requests"] == 0
+
+
+def test_no_firmware_between_two_telegrams(ran):
+    """LK-013, LT-004, LT-005: in every cycle the gap is exact: 18.5 us after an answer, 6 us after the time-out."""
+    _, _, records = ran
+    cycle = ("DATA_EXCHANGE", "INCLUSION")
+    gaps = {"OK": [], "NO_RESPONSE": []}
+    for before, after in zip(records, records[1:]):
+        if before["phase"] in cycle and after["phase"] in cycle and before["class"] in gaps:
+            end = 78_000 + (66_000 if before["delay_ns"] is None else before["delay_ns"] + 36_000)
+            gaps[before["class"]].append(after["t_ns"] - before["t_ns"] - end)
+    assert set(gaps["OK"]) == {18_500} and set(gaps["NO_RESPONSE"]) == {6_000}
+    assert len(gaps["OK"]) > 1000
+
+
+def test_only_the_right_slaves_get_data(ran):
+    """PL-004: DEXG goes to projected slaves only in protected mode, and to each of them."""
+    plant, _, records = ran
+    called = {record["index"] for record in records if record["call"] == "DEXG"}
+    present = {slave.index for slave in plant.slaves}
+    assert plant.host.protected and called == plant.host.pcd.keys() & present
