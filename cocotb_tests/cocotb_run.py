@@ -24,6 +24,7 @@ def run_cocotb(top, sources, test_module, *, name=None, parameters=None, extra_a
     args = ["--assert", "-Wall", "--timescale", "1ns/1ps", str(ROOT / "tools/lint.vlt"), *extra_args]
     if os.environ.get("RTL_COVERAGE") == "1":
         args.append("--coverage-line")
+    os.environ.setdefault("OBJCACHE", f"bash {ROOT / 'tools/objcache.sh'} {ROOT / 'build/objcache'}")
     runner = get_runner("verilator")
     runner.build(sources=[*PACKAGES, *(p if Path(p).is_absolute() else RTL / p for p in map(Path, sources))],
                  hdl_toplevel=top, parameters=parameters or {}, build_args=args, build_dir=build_dir, waves=waves,

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+// asi_xact: one call on the line: request, answer or classified error, immediate repetitions, and every gap.
+// One timer counts the clocks since the anchor as an oscilloscope on the pins would: a strobe of the filter arrives
+// StrobeDelay clocks after its pulse and so sets the timer to StrobeDelay. Each state compares it with one limit.
+// A result is one pulse of res_valid_o; the other res_* outputs are valid in that clock only.
+// Requirements: LT-002 .. LT-009, LT-011, LT-012, RX-012, RX-013 (docs/requirements.md).
+module asi_xact
+  import asi_map_pkg::*;
+#(
+  parameter int unsigned ClkHz       = 16_000_000,
+  parameter int unsigned HalfBitNs   = asi_timing_pkg::HalfBitNs,
+  parameter int unsigned WinEarlyNs  = asi_timing_pkg::WinEarlyNs,
+  parameter int unsigned WinLateNs   = asi_timing_pkg::WinLateNs,
+  parameter int unsigned FilterNs    = asi_timing_pkg::FilterNs,
+  parameter int unsigned RxQuietNs   = asi_timing_pkg::RxQuietNs,
+  parameter int unsigned TxMaskNs    = asi_timing_pkg::TxMaskNs,
+  parameter int unsigned RxOpenNs    = asi_timing_pkg::RxOpenNs,
+  parameter int unsigned RxTimeoutNs = asi_timing_pkg::RxTimeoutNs,
+  parameter int unsigned GapOkNs     = asi_timing_pkg::GapOkNs,
+  parameter int unsigned GapNorspNs  = asi_timing_pkg::GapNorspNs,
+  parameter int unsigned GapErrNs    = asi_timing_pkg::GapErrNs,
+  parameter int unsigned BabbleMaxNs = asi_timing_pkg::BabbleMaxNs,
+  parameter int unsigned IdleStartNs = asi_timing_pkg::IdleStartNs,
+  parameter int unsigned TxBiasNs    = asi_timing_pkg::TxBiasNs
+) (
+  input  logic         clk_i, rst_i,    // rst_i: synchronous, active high
+  // 0: nothing starts, an open call ends as ABORTED; what is being sent is completed
+  input  logic         enable_i,
+  input  logic         req_valid_i,     // a request is offered; taken in the clock in which req_ready_o is 1 as well
+  output logic         req_ready_o,     // the gap is over
+  input  logic [10:0]  req_call_i,      // CB, A4..A0, I4..I0
+  input  logic [1:0]   req_retries_i,   // immediate repetitions after a failure
+  input  logic         req_no_reply_i,  // silence is success
+  output logic         res_valid_o,     // one clock per request taken
+  output error_class_e res_last_o, res_first_o,  // class of the last and of the first attempt
+  output logic [3:0]   res_data_o,      // answer, when res_last_o is OK
+  output logic [1:0]   res_repeats_o,   // repetitions made
+  output logic         sent_o, repeat_o,  // one clock per request on the line; repeat_o: it is a repetition
+  input  logic         rx_p_i, rx_n_i,  // pins: comparators, asynchronous
+  output logic         tx_man_o, tx_en_o  // pins: Manchester level, bias on
+);
+  localparam int unsigned StrobeDelay = asi_timing_pkg::strobe_delay(FilterNs, ClkHz);
+  localparam int unsigned TxMask      = asi_timing_pkg::clocks(TxMaskNs, ClkHz);
+  localparam int unsigned RxOpen      = asi_timing_pkg::clocks(RxOpenNs, ClkHz);
+  localparam int unsigned RxTimeout   = asi_timing_pkg::clocks(RxTimeoutNs, ClkHz);
+  localparam int unsigned GapOk       = asi_timing_pkg::clocks(GapOkNs, ClkHz);
+  // this one from the last request pulse, like the time-out before it
+  localparam int unsigned GapNorsp    = RxTimeout + asi_timing_pkg::clocks(GapNorspNs, ClkHz);
+  localparam int unsigned GapErr      = asi_timing_pkg::clocks(GapErrNs, ClkHz);
+  localparam int unsigned IdleStart   = asi_timing_pkg::clocks(IdleStartNs, ClkHz);
+  localparam int unsigned BabbleMax   = asi_timing_pkg::clocks(BabbleMaxNs, ClkHz);
+  localparam int unsigned Bias        = asi_timing_pkg::clocks(TxBiasNs, ClkHz);
+
+  function automatic int unsigned max(int unsigned a, int unsigned b);
+    return (a > b) ? a : b;
+  endfunction
+  localparam int unsigned TimeW   = $clog2(max(max(GapNorsp, IdleStart), max(GapOk, GapErr)) + 1);
+  localparam int unsigned BabbleW = $clog2(BabbleMax);
+
+  // a gap of g clocks: first edge at g means start at g - 1 (asi_tx) and armed_q set one clock after its limit
+  function automatic logic [TimeW-1:0] gap_limit(int unsigned gap, logic armed);
+    return armed ? TimeW'(gap - 1) : (gap > Bias + 2) ? TimeW'(gap - Bias - 2) : '0;
+  endfunction
+
+  typedef enum logic [3:0] {
+    StOff, StIdle, StReady, StTx, StMask, StEarly, StListen, StReceive, StGapOk, StGapNorsp, StGapErr
+  } state_e;
+  state_e             state_d, state_q;
+  logic [TimeW-1:0]   time_d, time_q, limit;
+  logic               reached;            // time_q has come to the limit of this state
+  logic [BabbleW-1:0] babble_d, babble_q;
+  logic               babble_end;         // waited long enough for quiet
+  logic               armed_d, armed_q;   // in a gap: P_TX_BIAS before its end
+  logic               open_d, open_q;     // a call is open; in a gap: its repetition is due
+  logic [10:0]        call_d, call_q;
+  logic [1:0]         retries_d, retries_q, repeats_d, repeats_q;
+  logic               no_reply_d, no_reply_q;
+  error_class_e       first_d, first_q;   // class of the first attempt, OK while it has none
+  error_class_e       attempt_class;
+  logic               attempt_done, can_start, start, quiet_wait, gap;
+
+  logic         rx_p, rx_n, p_start, n_start, pulse;
+  logic         tx_busy, tx_last, rx_en, rx_first, rx_done;
+  error_class_e rx_class;
+
+  asi_sync #(.Width(2)) i_sync (.clk_i, .rst_i, .async_i({rx_p_i, rx_n_i}), .sync_o({rx_p, rx_n}));
+  asi_pulse_filter #(.ClkHz(ClkHz), .FilterNs(FilterNs)) i_filter_p (.clk_i, .rst_i, .pulse_i(rx_p), .start_o(p_start));
+  asi_pulse_filter #(.ClkHz(ClkHz), .FilterNs(FilterNs)) i_filter_n (.clk_i, .rst_i, .pulse_i(rx_n), .start_o(n_start));
+  asi_tx #(.ClkHz(ClkHz), .HalfBitNs(HalfBitNs)) i_tx (
+    .clk_i, .rst_i, .start_i(start), .arm_i(armed_q && enable_i && (open_q || req_valid_i)),
+    .call_i(open_q ? call_q : req_call_i), .busy_o(tx_busy), .last_o(tx_last), .tx_man_o, .tx_en_o
+  );
+  asi_rx #(
+    .ClkHz(ClkHz), .HalfBitNs(HalfBitNs), .WinEarlyNs(WinEarlyNs), .WinLateNs(WinLateNs), .RxQuietNs(RxQuietNs)
+  ) i_rx (
+    .clk_i, .rst_i, .n_start_i(n_start), .p_start_i(p_start), .en_i(rx_en),
+    .first_o(rx_first), .done_o(rx_done), .class_o(rx_class), .data_o(res_data_o)
+  );
+
+  assign pulse = p_start || n_start;
+  assign rx_en = (state_q == StListen) || (state_q == StReceive);
+  assign quiet_wait = (state_q == StIdle) || (state_q == StGapErr);
+  assign gap        = quiet_wait || (state_q == StGapOk) || (state_q == StGapNorsp);
+  assign reached    = time_q >= limit;
+  assign babble_end = babble_q == BabbleW'(BabbleMax - 2);
+  assign can_start  = enable_i && (babble_end || (!pulse && (state_q == StReady || (gap && armed_q && reached))));
+  assign req_ready_o = can_start && !open_q;
+  assign start       = can_start && (open_q || req_valid_i);
+  assign sent_o      = start;
+  assign repeat_o    = start && open_q;
+
+  always_comb begin
+    unique case (state_q)
+      StMask:     limit = TimeW'(TxMask + StrobeDelay);
+      StEarly:    limit = TimeW'(RxOpen + StrobeDelay - 1);
+      StListen:   limit = TimeW'(RxTimeout + StrobeDelay);
+      StGapOk:    limit = gap_limit(GapOk, armed_q);
+      StGapNorsp: limit = gap_limit(GapNorsp, armed_q);
+      StGapErr:   limit = gap_limit(GapErr, armed_q);
+      StIdle:     limit = gap_limit(IdleStart, armed_q);
+      default:    limit = '0;
+    endcase
+  end
+
+  always_comb begin
+    state_d = state_q;  time_d = time_q + 1'b1;  attempt_done = 1'b0;  attempt_class = rx_class;
+    armed_d = gap && !pulse && (armed_q || reached);
+    if (pulse) time_d = TimeW'(StrobeDelay + 1);
+    unique case (state_q)
+      // StOff: disabled; what is being sent is sent to its end
+      StOff: begin
+        time_d = '0;
+        if (enable_i && !tx_busy) state_d = StIdle;
+      end
+      // StIdle: P_IDLE_START of quiet after StOff.  StReady: nothing to wait for but a request
+      StIdle, StReady: ;
+      // StTx: own request; the last edge is the anchor of the next four states
+      StTx: begin
+        time_d = TimeW'(tx_last);
+        if (tx_last) state_d = StMask;
+      end
+      // StMask: echo of the own last pulse
+      StMask: begin
+        time_d = time_q + 1'b1;
+        if (reached) state_d = StEarly;
+      end
+      // StEarly: no slave may answer yet
+      StEarly: if (pulse) begin
+        attempt_done = 1'b1;  attempt_class = ErrEarly;  state_d = StGapErr;
+      end else if (reached) state_d = StListen;
+      // StListen: until P_RX_TIMEOUT, inclusive
+      StListen: if (rx_first) state_d = StReceive;
+      else if (reached) begin
+        attempt_done = 1'b1;  attempt_class = no_reply_q ? ErrOk : ErrNoResponse;  state_d = StGapNorsp;
+      end
+      // StReceive: the receiver decides; the anchor is the last pulse, whichever it was
+      StReceive: if (rx_done) begin
+        attempt_done = 1'b1;  state_d = (rx_class == ErrOk) ? StGapOk : StGapErr;
+      end
+      // gaps: what comes now belongs to nobody, the line must be quiet again
+      StGapOk, StGapNorsp, StGapErr: if (pulse) state_d = StGapErr;
+      default: state_d = StOff;
+    endcase
+    if (state_q == StReady && pulse) state_d = StGapErr;
+    if (can_start) begin
+      state_d = start ? StTx : StReady;  time_d = '0;  armed_d = 1'b0;
+    end
+    if (!enable_i) state_d = StOff;
+    babble_d = (quiet_wait && !can_start) ? babble_q + 1'b1 : '0;
+  end
+
+  always_comb begin
+    open_d = open_q;  call_d = call_q;  retries_d = retries_q;  no_reply_d = no_reply_q;
+    repeats_d = repeats_q;  first_d = first_q;
+    res_valid_o = 1'b0;  res_last_o = attempt_class;
+    if (start && !open_q) begin
+      open_d    = 1'b1;            call_d     = req_call_i;      first_d   = ErrOk;
+      retries_d = req_retries_i;   no_reply_d = req_no_reply_i;  repeats_d = '0;
+    end
+    if (start && open_q) repeats_d = repeats_q + 1'b1;
+    if (open_q && !enable_i) begin
+      res_valid_o = 1'b1;  res_last_o = ErrAborted;  open_d = 1'b0;
+    end else if (attempt_done) begin
+      if (first_q == ErrOk) first_d = attempt_class;
+      if (attempt_class == ErrOk || repeats_q == retries_q) begin res_valid_o = 1'b1; open_d = 1'b0; end
+    end
+    res_first_o   = (first_q == ErrOk) ? res_last_o : first_q;
+    res_repeats_o = repeats_q;
+  end
+
+  always_ff @(posedge clk_i) begin
+    state_q    <= rst_i ? StOff : state_d;
+    time_q     <= rst_i ? '0    : time_d;
+    babble_q   <= rst_i ? '0    : babble_d;
+    armed_q    <= rst_i ? 1'b0  : armed_d;
+    open_q     <= rst_i ? 1'b0  : open_d;
+    call_q     <= call_d;   // these five are set when a call opens
+    retries_q  <= retries_d;
+    no_reply_q <= no_reply_d;
+    repeats_q  <= repeats_d;
+    first_q    <= first_d;
+  end
+
+`ifndef SYNTHESIS
+  initial begin
+    Mask_A: assert (TxMask < RxOpen && RxOpen < RxTimeout);
+    Gaps_A: assert (GapNorsp > RxTimeout + StrobeDelay + 2);  // the time-out is decided before its gap ends
+  end
+  logic res_q;  // the last clock had a result
+  always_ff @(posedge clk_i) begin
+    res_q <= !rst_i && res_valid_o;
+    if (!rst_i) begin
+      OneResult_A:  assert (!(res_valid_o && res_q));
+      OpenResult_A: assert (!res_valid_o || open_q);
+      Quiet_A:      assert (!start || !tx_busy);
+      Enabled_A:    assert (!start || enable_i);
+      Repeats_A:    assert (!open_q || repeats_q <= retries_q);
+      TxState_A:    assert (!tx_busy || tx_en_o);
+      Attempt_A:    assert (!attempt_done || open_q);
+      Babble_C:     cover (babble_end);
+      Repeat_C:     cover (repeat_o);
+      Aborted_C:    cover (res_valid_o && res_last_o == ErrAborted);
+      Early_C:      cover (attempt_done && attempt_class == ErrEarly);
+      BackToBack_C: cover (start && gap);
+    end
+  end
+`endif
+endmodule
