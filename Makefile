@@ -36,6 +36,21 @@ setup: $(VENV)/.ready  ## virtual environment with the pinned packages
 regs: $(VENV)/.ready  ## regenerate everything that comes from rdl/asi.rdl, and the HTML register reference
 	@$(VPY) tools/gen_registers.py --html $(BUILD)/registers
 
+# ---------------------------------------------------------------- lint, synthesis
+VEXRISCV := $(abspath $(VENV))/lib/$(PYDIR)/site-packages/pythondata_cpu_vexriscv/verilog/VexRiscv_Min.v
+# smallest, default and largest parameters: a width that slips shows at one of them
+LINT_SETS := "-GClkHz=8000000 -GRamWords=4096" "" "-GClkHz=48000000 -GBootFromFlash=1"
+
+.PHONY: lint
+lint: $(VENV)/.ready  ## Verilator -Wall over the whole chip, three parameter sets
+	@for set in $(LINT_SETS); do echo "lint asi_master $$set"; \
+	  verilator --lint-only --quiet-stats -Wall $(CURDIR)/tools/lint.vlt --top-module asi_master $$set \
+	    -F $(CURDIR)/rtl/asi_master.f $(VEXRISCV) || exit 1; done
+
+.PHONY: synth
+synth: $(VENV)/.synth  ## cells and clock rate on iCE40 UP5K and ECP5-25F (minutes), table and build/synth/numbers.json
+	@$(VPY) syn/synth.py --vexriscv $(VEXRISCV) --out $(BUILD)/synth $(ARGS)
+
 # ---------------------------------------------------------------- clean
 .PHONY: clean
 clean:  ## remove build results, keep the environment

@@ -421,11 +421,11 @@ module asi_regs (
         automatic logic load_next_c;
         next_c = field_storage.EVENT.cycle_done.value;
         load_next_c = '0;
-        if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
-            next_c = field_storage.EVENT.cycle_done.value & ~(decoded_wr_data[0:0] & decoded_wr_biten[0:0]);
-            load_next_c = '1;
-        end else if(hwif_in.EVENT.cycle_done.hwset) begin // HW Set
+        if(hwif_in.EVENT.cycle_done.hwset) begin // HW Set
             next_c = '1;
+            load_next_c = '1;
+        end else if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
+            next_c = field_storage.EVENT.cycle_done.value & ~(decoded_wr_data[0:0] & decoded_wr_biten[0:0]);
             load_next_c = '1;
         end
         field_combo.EVENT.cycle_done.next = next_c;
@@ -447,11 +447,11 @@ module asi_regs (
         automatic logic load_next_c;
         next_c = field_storage.EVENT.batch_done.value;
         load_next_c = '0;
-        if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
-            next_c = field_storage.EVENT.batch_done.value & ~(decoded_wr_data[1:1] & decoded_wr_biten[1:1]);
-            load_next_c = '1;
-        end else if(hwif_in.EVENT.batch_done.hwset) begin // HW Set
+        if(hwif_in.EVENT.batch_done.hwset) begin // HW Set
             next_c = '1;
+            load_next_c = '1;
+        end else if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
+            next_c = field_storage.EVENT.batch_done.value & ~(decoded_wr_data[1:1] & decoded_wr_biten[1:1]);
             load_next_c = '1;
         end
         field_combo.EVENT.batch_done.next = next_c;
@@ -473,11 +473,11 @@ module asi_regs (
         automatic logic load_next_c;
         next_c = field_storage.EVENT.slave_lost.value;
         load_next_c = '0;
-        if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
-            next_c = field_storage.EVENT.slave_lost.value & ~(decoded_wr_data[2:2] & decoded_wr_biten[2:2]);
-            load_next_c = '1;
-        end else if(hwif_in.EVENT.slave_lost.hwset) begin // HW Set
+        if(hwif_in.EVENT.slave_lost.hwset) begin // HW Set
             next_c = '1;
+            load_next_c = '1;
+        end else if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
+            next_c = field_storage.EVENT.slave_lost.value & ~(decoded_wr_data[2:2] & decoded_wr_biten[2:2]);
             load_next_c = '1;
         end
         field_combo.EVENT.slave_lost.next = next_c;
@@ -499,11 +499,11 @@ module asi_regs (
         automatic logic load_next_c;
         next_c = field_storage.EVENT.apf_change.value;
         load_next_c = '0;
-        if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
-            next_c = field_storage.EVENT.apf_change.value & ~(decoded_wr_data[3:3] & decoded_wr_biten[3:3]);
-            load_next_c = '1;
-        end else if(hwif_in.EVENT.apf_change.hwset) begin // HW Set
+        if(hwif_in.EVENT.apf_change.hwset) begin // HW Set
             next_c = '1;
+            load_next_c = '1;
+        end else if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
+            next_c = field_storage.EVENT.apf_change.value & ~(decoded_wr_data[3:3] & decoded_wr_biten[3:3]);
             load_next_c = '1;
         end
         field_combo.EVENT.apf_change.next = next_c;
@@ -525,11 +525,11 @@ module asi_regs (
         automatic logic load_next_c;
         next_c = field_storage.EVENT.tick.value;
         load_next_c = '0;
-        if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
-            next_c = field_storage.EVENT.tick.value & ~(decoded_wr_data[4:4] & decoded_wr_biten[4:4]);
-            load_next_c = '1;
-        end else if(hwif_in.EVENT.tick.hwset) begin // HW Set
+        if(hwif_in.EVENT.tick.hwset) begin // HW Set
             next_c = '1;
+            load_next_c = '1;
+        end else if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
+            next_c = field_storage.EVENT.tick.value & ~(decoded_wr_data[4:4] & decoded_wr_biten[4:4]);
             load_next_c = '1;
         end
         field_combo.EVENT.tick.next = next_c;
@@ -551,11 +551,11 @@ module asi_regs (
         automatic logic load_next_c;
         next_c = field_storage.EVENT.host_attn.value;
         load_next_c = '0;
-        if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
-            next_c = field_storage.EVENT.host_attn.value & ~(decoded_wr_data[5:5] & decoded_wr_biten[5:5]);
-            load_next_c = '1;
-        end else if(hwif_in.EVENT.host_attn.hwset) begin // HW Set
+        if(hwif_in.EVENT.host_attn.hwset) begin // HW Set
             next_c = '1;
+            load_next_c = '1;
+        end else if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
+            next_c = field_storage.EVENT.host_attn.value & ~(decoded_wr_data[5:5] & decoded_wr_biten[5:5]);
             load_next_c = '1;
         end
         field_combo.EVENT.host_attn.next = next_c;
