@@ -51,6 +51,9 @@ lint: $(VENV)/.ready  ## Verilator -Wall over the whole chip, three parameter se
 synth: $(VENV)/.synth  ## cells and clock rate on iCE40 UP5K and ECP5-25F (minutes), table and build/synth/numbers.json
 	@$(VPY) syn/synth.py --vexriscv $(VEXRISCV) --out $(BUILD)/synth $(ARGS)
 
+# ---------------------------------------------------------------- firmware
+include firmware/firmware.mk
+
 # ---------------------------------------------------------------- clean
 .PHONY: clean
 clean:  ## remove build results, keep the environment
