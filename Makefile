@@ -54,6 +54,9 @@ synth: $(VENV)/.synth  ## cells and clock rate on iCE40 UP5K and ECP5-25F (minut
 # ---------------------------------------------------------------- firmware
 include firmware/firmware.mk
 
+# ---------------------------------------------------------------- native simulation
+include tb/tb.mk
+
 # ---------------------------------------------------------------- clean
 .PHONY: clean
 clean:  ## remove build results, keep the environment
