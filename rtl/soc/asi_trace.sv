@@ -2,6 +2,7 @@
 // asi_trace: readable text for waveforms: what is asked, what is answered, in which phase. Simulation only (PL-003).
 // Show the *_text_o signals as ASCII, the nibble signals as hexadecimal: digit n from the right belongs to index n.
 // Texts are left-justified with spaces. It learns from RDID answers which numbers use A/B addressing.
+`ifndef SYNTHESIS
 module asi_trace
   import asi_map_pkg::*;
 #(
@@ -169,3 +170,4 @@ module asi_trace
     end
   end
 endmodule
+`endif
