@@ -51,11 +51,11 @@ lint: $(VENV)/.ready  ## Verilator -Wall over the whole chip, three parameter se
 synth: $(VENV)/.synth  ## cells and clock rate on iCE40 UP5K and ECP5-25F (minutes), table and build/synth/numbers.json
 	@$(VPY) syn/synth.py --vexriscv $(VEXRISCV) --out $(BUILD)/synth $(ARGS)
 
-# ---------------------------------------------------------------- native simulation
-include tb/tb.mk
-
 # ---------------------------------------------------------------- firmware
 include firmware/firmware.mk
+
+# ---------------------------------------------------------------- native simulation
+include tb/tb.mk
 
 # ---------------------------------------------------------------- clean
 .PHONY: clean
@@ -69,7 +69,8 @@ pytest: $(VENV)/.ready  ## run some tests: make pytest ARGS='cocotb_tests/block 
 
 # ---------------------------------------------------------------- test
 .PHONY: test
-test: $(VENV)/.ready $(BUILD)/tb/libasi_chip.so $(BUILD)/firmware/asi_test.hex  ## everything, with one closing line of counts; JUnit and coverage in build/test
+test: $(BUILD)/tb/libasi_chip.so $(BUILD)/firmware/asi_test.hex
+test: $(VENV)/.ready  ## everything, with one closing line of counts; JUnit and coverage in build/test
 	@rm -rf $(BUILD)/coverage-*.dat $(BUILD)/firmware/coverage && mkdir -p $(BUILD)/test
 	@RTL_COVERAGE=1 $(VPY) -m pytest -n 2 --dist loadfile --junitxml=$(BUILD)/test/junit.xml
 

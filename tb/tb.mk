@@ -18,11 +18,11 @@ pytest test: $(TB_OUT)/libasi_slaves.so
 
 # ---------------------------------------------------------------- whole chip
 # The firmware is not in the model: the image is loaded when a chip is made (+firmware=, FirmwareHex).
-TB_RTL     = $(addprefix rtl/,$(shell grep -v '^//' rtl/asi_master.f))
+TB_RTL     = $(addprefix $(CURDIR)/rtl/,$(shell grep -v '^//' rtl/asi_master.f))
 TB_MODEL   = verilator --cc --build -j 2 --top-module asi_master --prefix Vasi_master -Mdir $@ \
              -GClkHz=$(ASI_CLK_HZ) -O3 --x-assign fast --x-initial fast --noassert --timescale 1ns/1ps \
              -CFLAGS "-fPIC" -MAKEFLAGS "OPT_FAST=-O3 OPT_SLOW=-O1 OPT_GLOBAL=-O2 CFG_CXXFLAGS_PCH_I=-include"
-TB_LINK    = $(TB_CXX) $(TB_FLAGS) -DASI_CLK_HZ=$(ASI_CLK_HZ) -I$(1) -isystem $(VERILATOR_ROOT)/include -shared \
+TB_LINK    = $(TB_CXX) $(TB_FLAGS) -DASI_CLK_HZ=$(ASI_CLK_HZ) -I$(1) -isystem $(VERILATOR_ROOT)/include -isystem $(VERILATOR_ROOT)/include/vltstd -shared \
              tb/asi_chip.cpp $(TB_SLAVES) $(1)/libVasi_master.a $(1)/libverilated.a -lpthread -o $@
 
 # FST needs the headers of lz4 and zlib
@@ -30,13 +30,13 @@ TB_FST     = $(shell printf '\43include <lz4.h>\n\43include <zlib.h>\n' | $(TB_C
 
 $(TB_OUT)/model: $(TB_RTL) tools/lint.vlt $(VENV)/.ready
 	@mkdir -p $(@D)
-	$(TB_MODEL) tools/lint.vlt $(TB_RTL) $(VEXRISCV) >$@.log || { cat $@.log; rm -rf $@; exit 1; }
+	$(TB_MODEL) $(CURDIR)/tools/lint.vlt $(TB_RTL) $(VEXRISCV) >$@.log || { cat $@.log; rm -rf $@; exit 1; }
 	@touch $@
 
 $(TB_OUT)/model_trace: $(TB_RTL) tools/lint.vlt $(VENV)/.ready
 	@mkdir -p $(@D)
 	$(if $(TB_FST),,@echo "waves will be VCD; for the smaller FST install the headers: Debian liblz4-dev zlib1g-dev")
-	$(TB_MODEL) $(if $(TB_FST),--trace-fst,--trace-vcd) tools/lint.vlt $(TB_RTL) $(VEXRISCV) >$@.log || \
+	$(TB_MODEL) $(if $(TB_FST),--trace-fst,--trace-vcd) $(CURDIR)/tools/lint.vlt $(TB_RTL) $(VEXRISCV) >$@.log || \
 	    { cat $@.log; rm -rf $@; exit 1; }
 	@touch $@
 
