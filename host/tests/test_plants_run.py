@@ -67,3 +67,12 @@ def test_only_the_right_slaves_get_data(ran):
     called = {record["index"] for record in records if record["call"] == "DEXG"}
     present = {slave.index for slave in plant.slaves}
     assert plant.host.protected and called == plant.host.pcd.keys() & present
+
+
+def test_full_networks_keep_the_cycle(ran):
+    """LK-011, LK-012: 31 slaves and an extra call stay below 4.95 ms, and equal cycles do not differ by a clock."""
+    plant, result, _ = ran
+    cycles = result["cycles"]
+    if len({index & 31 for index in plant.host.pcd}) == 31:
+        assert cycles["max_ns"] <= 4_950_000 and cycles["max_ns"] - cycles["min_ns"] <= 1e9 / result["run"]["clk_hz"]
+    assert cycles["count"] > 20
