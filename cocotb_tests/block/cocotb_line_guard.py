@@ -66,7 +66,8 @@ async def fail_and_clear(dut):
 
 @cocotb.test(timeout_time=2, timeout_unit="ms")
 async def dips(dut):
-    """LT-010: dips below 6 us neither add up to a fail nor restart the 10 ms; peaks below 6 us do not restart the 1 ms."""
+    """LT-010: dips below 6 us neither add up to a fail nor restart the 10 ms; peaks below 6 us do not restart the 1
+    ms."""
     changes = await begin(dut)
     started = now()
     while now() < started + 10_200:      # 5 us low in every 20 us from reset on
