@@ -26,7 +26,7 @@ module asi_seq_tb
   output logic [2:0]  phase_o,
   output logic        req_valid_o,
   // events, counted
-  output logic [15:0] cycle_count_o, batch_count_o, lost_count_o, sync_count_o, res_count_o,
+  output logic [15:0] cycle_count_o, batch_count_o, lost_count_o, sync_count_o, res_count_o, begun_count_o,
   output logic [31:0] sync_time_o, offer_max_o,
   output logic        batch_busy_o, cycle_busy_o,
   // core
@@ -76,7 +76,8 @@ module asi_seq_tb
   always_ff @(posedge clk_i)
     if (rst_i) begin
       {busy, sent, again, attempt, left, gap, late, since} <= '0;
-      {acc_count_o, cycle_count_o, batch_count_o, lost_count_o, sync_count_o, res_count_o, time_o, offer_max_o} <= '0;
+      {acc_count_o, cycle_count_o, batch_count_o, lost_count_o, sync_count_o, res_count_o, begun_count_o} <= '0;
+      time_o <= '0;
       tick <= 1'b0;
     end else begin
       time_o <= time_o + 32'd1;
@@ -99,6 +100,7 @@ module asi_seq_tb
       else if (busy) begin
         attempt <= attempt + 2'd1;  sent <= 1'b1;  again <= 1'b1;  left <= again_clocks_i;
       end
+      begun_count_o <= begun_count_o + 16'(u_dut.state_q == u_dut.StPace && u_dut.state_d == u_dut.StFetch);
       cycle_count_o <= cycle_count_o + 16'(cycle_done);
       batch_count_o <= batch_count_o + 16'(batch_done);
       lost_count_o  <= lost_count_o + 16'(slave_lost);
@@ -109,8 +111,9 @@ module asi_seq_tb
   // longest time from a result to the next offer, over calls that directly follow each other
   logic waiting;
   always_ff @(posedge clk_i)
-    if (rst_i) waiting <= 1'b0;
+    if (rst_i) begin waiting <= 1'b0; offer_max_o <= '0; end
     else if (res_valid) waiting <= 1'b1;
+    else if (!cycle_busy_o && !batch_busy_o) waiting <= 1'b0;
     else if (waiting && req_valid) begin
       waiting <= 1'b0;
       if (since > offer_max_o) offer_max_o <= since;

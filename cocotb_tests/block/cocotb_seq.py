@@ -98,6 +98,7 @@ class Model:
             self.was_mgmt = pending
             if pending and (yield from self.extra(MGMT, MGMT_REQ)):
                 return
+            self.was_mgmt = False
             if ram[INCL_REQ] & VALID and (yield from self.extra(INCL, INCL_REQ)):
                 return
         elif pending and not (self.was_mgmt and ram[INCL_REQ] & VALID):
@@ -125,7 +126,7 @@ class TB:
         self.length = lambda call: CALL
         self.calls, self.gen, self.pending_result = [], None, None
         self.judged = self.strict = True   # judged: compare with the model; strict: no offer may be late
-        self.checked = self.published = 0
+        self.checked = self.published = self.dropped = 0  # dropped: cycles begun, but ended without publication
         Clock(dut.clk_i, 125, unit="ns").start()
 
     async def start(self):
@@ -216,13 +217,19 @@ class TB:
 
     async def cycles(self, count, stop=True):
         """Run count more cycles; with stop=True the sequencer is idle afterwards."""
-        goal = self.published + count
-        self.dut.cycle_en_i.value = 1
+        dut, goal = self.dut, self.published + count
+        if not int(dut.cycle_busy_o.value):
+            dut.cycle_en_i.value = 1
+        while stop and self.published < goal - 1:
+            await dut.cycle_count_o.value_change
+            await FallingEdge(dut.clk_i)
+        if stop:
+            while int(dut.begun_count_o.value) == int(dut.cycle_count_o.value) + self.dropped:
+                await RisingEdge(dut.clk_i)
+            dut.cycle_en_i.value = 0
         while self.published < goal:
-            await self.dut.cycle_count_o.value_change
-            if self.published >= goal - 1 and stop:
-                self.dut.cycle_en_i.value = 0
-            await FallingEdge(self.dut.clk_i)
+            await dut.cycle_count_o.value_change
+            await FallingEdge(dut.clk_i)  # _publish has counted by now
         if stop:
             await self.idle()
 
@@ -234,6 +241,7 @@ class TB:
     async def batch(self, entries):
         """-> result words"""
         dut, first = self.dut, int(self.dut.batch_count_o.value)
+        await FallingEdge(dut.clk_i)
         for k, word in enumerate(entries):
             self.poke(BATCH + k, word)
         dut.batch_start_i.value = 1
@@ -265,7 +273,7 @@ class TB:
         return out
 
 
-@cocotb.test(timeout_time=200, timeout_unit="ms")
+@cocotb.test(timeout_time=60, timeout_unit="ms")
 async def rising_order(dut):
     """LK-001: each cycle calls every active number once, in rising order; 0 and index 32 are never called."""
     tb = TB(dut)
@@ -281,7 +289,7 @@ async def rising_order(dut):
     assert [c >> 5 for _, _, c, *_ in tb.calls[15:]] == [31, 31]
 
 
-@cocotb.test(timeout_time=200, timeout_unit="ms")
+@cocotb.test(timeout_time=60, timeout_unit="ms")
 async def turns(dut):
     """LK-002: A in even, B in odd cycles when both are active; a single one in every cycle. CA-001, CA-004: I3 = ~Sel."""
     tb = TB(dut)
@@ -299,7 +307,7 @@ async def turns(dut):
     assert [c for _, _, c, *_ in tb.calls[12:]] == [b5, 9 << 5 | 9, 10 << 5] * 2
 
 
-@cocotb.test(timeout_time=200, timeout_unit="ms")
+@cocotb.test(timeout_time=60, timeout_unit="ms")
 async def lost_slave(dut):
     """LK-003, LK-004, LK-005: DexgRetry repetitions, FailCycles cycles, then no call; the input is kept, then 0."""
     tb = TB(dut)
@@ -334,7 +342,7 @@ async def lost_slave(dut):
     assert int(dut.lost_count_o.value) == 1
 
 
-@cocotb.test(timeout_time=200, timeout_unit="ms")
+@cocotb.test(timeout_time=60, timeout_unit="ms")
 async def only_slave_lost(dut):
     """LK-004: the only slave is lost at the end of a cycle: it is not called once more, although it was searched."""
     tb = TB(dut)
@@ -352,8 +360,8 @@ async def only_slave_lost(dut):
     assert len(tb.calls) == 3 * fail and int(dut.lost_count_o.value) == 3
 
 
-# one slave in each word of the images
-SPREAD = (1, 8, 16, 24, 34, 41, 50, 58)
+# one slave in each word of the images, in the order of calls
+SPREAD = (1, 34, 8, 41, 16, 50, 24, 58)
 
 
 async def core_write(dut, word, value):
@@ -373,7 +381,7 @@ def outputs_per_cycle(tb):
     return [tuple(nibbles[k:k + 8]) for k in range(0, len(nibbles) - 7, 8)]
 
 
-@cocotb.test(timeout_time=500, timeout_unit="ms")
+@cocotb.test(timeout_time=120, timeout_unit="ms")
 async def snapshot_under_hold(dut):
     """LK-006: a core that rewrites OUT_IMG under out_hold never gets two of its images into one cycle."""
     tb = TB(dut)
@@ -394,7 +402,7 @@ async def snapshot_under_hold(dut):
                 await core_write(dut, OUT_IMG + k, 0x11111111 * generation)
                 await ClockCycles(dut.clk_i, rng.randrange(1, 900 if rng.random() < 0.3 else 6))
             dut.out_hold_i.value = 0
-            await ClockCycles(dut.clk_i, rng.randrange(1, 40))
+            await ClockCycles(dut.clk_i, rng.randrange(1, 4000))
     cocotb.start_soon(core())
     await tb.cycles(150)
     seen = outputs_per_cycle(tb)
@@ -402,7 +410,7 @@ async def snapshot_under_hold(dut):
     assert len(seen) == 150 and len({cycle[0] for cycle in seen}) > 8
 
 
-@cocotb.test(timeout_time=500, timeout_unit="ms")
+@cocotb.test(timeout_time=120, timeout_unit="ms")
 async def snapshot_is_one_moment(dut):
     """LK-006: without out_hold the outputs of a cycle are the words of one moment, first nibble included."""
     tb = TB(dut)
@@ -411,7 +419,7 @@ async def snapshot_is_one_moment(dut):
     for index in SPREAD:
         tb.poke(index, 1)
     rng = random.Random(66)
-    image, moments, sizes = [0] * 8, {(0,) * 8}, []
+    image, moments = [0] * 8, {(0,) * 8}
     dut.cycle_en_i.value = 1
 
     async def core():  # writes as fast as it can around the end of each cycle
@@ -424,8 +432,7 @@ async def snapshot_is_one_moment(dut):
                 k, value = rng.randrange(8), rng.randrange(16)
                 await core_write(dut, OUT_IMG + k, 0x11111111 * value)
                 image[k] = value
-                moments.add(tuple(image))
-            sizes.append(len(moments))
+                moments.add(tuple(image[index // 8] for index in SPREAD))
     cocotb.start_soon(core())
     await tb.cycles(60)
     seen = outputs_per_cycle(tb)
@@ -433,7 +440,7 @@ async def snapshot_is_one_moment(dut):
     assert all(cycle in moments for cycle in seen)
 
 
-@cocotb.test(timeout_time=500, timeout_unit="ms")
+@cocotb.test(timeout_time=120, timeout_unit="ms")
 async def published_together(dut):
     """LK-007: IN_IMG changes only in one uninterrupted go at the end of a cycle, with one event per cycle."""
     tb = TB(dut)
@@ -457,7 +464,7 @@ async def published_together(dut):
     assert len(images) == 7 and int(dut.cycle_count_o.value) == 6
 
 
-@cocotb.test(timeout_time=500, timeout_unit="ms")
+@cocotb.test(timeout_time=120, timeout_unit="ms")
 async def one_extra_slot(dut):
     """LK-008: one extra slot: management when pending, but never twice in a row while an inclusion request is valid;
     tags wrap; a late firmware only repeats the probe."""
@@ -490,7 +497,7 @@ async def one_extra_slot(dut):
     assert len(extras()) == before + 258    # nothing new: nothing sent
 
 
-@cocotb.test(timeout_time=500, timeout_unit="ms")
+@cocotb.test(timeout_time=120, timeout_unit="ms")
 async def two_extra_slots(dut):
     """LK-009: with two extra slots management and inclusion both run in each cycle, in this order."""
     tb = TB(dut)
@@ -510,7 +517,7 @@ async def two_extra_slots(dut):
     assert [c[1] for c in tb.calls[12:]] == [DEXG, INCL, DEXG, MGMT, DEXG]
 
 
-@cocotb.test(timeout_time=500, timeout_unit="ms")
+@cocotb.test(timeout_time=120, timeout_unit="ms")
 async def batches(dut):
     """LK-010: 1, 64 and 0 requests, back to back, each with its retries and its result in its place."""
     tb = TB(dut)
@@ -555,7 +562,7 @@ def real_length(call):
     return 143 * US
 
 
-@cocotb.test(timeout_time=500, timeout_unit="ms")
+@cocotb.test(timeout_time=120, timeout_unit="ms")
 async def full_network(dut):
     """LK-011, LK-012, LK-013: 31 synchronous slaves and one extra call with real times: 32 * 154 us, equal cycles."""
     tb = TB(dut)
@@ -579,7 +586,7 @@ async def full_network(dut):
     assert set(periods) == {32 * 154 * US} and max(periods) <= 4950 * US
 
 
-@cocotb.test(timeout_time=900, timeout_unit="ms")
+@cocotb.test(timeout_time=150, timeout_unit="ms")
 async def gaps_never_stretched(dut):
     """LK-013, LK-012: with the shortest gap no offer is late and cycles are equal to the clock, for any set of slots."""
     tb = TB(dut)
@@ -602,7 +609,7 @@ async def gaps_never_stretched(dut):
     dut._log.info("longest time from a result to the next offer: %d clocks", int(dut.offer_max_o.value))
 
 
-@cocotb.test(timeout_time=900, timeout_unit="ms")
+@cocotb.test(timeout_time=150, timeout_unit="ms")
 async def shortest_cycle(dut):
     """LK-014, LK-012: cycles are not shorter than min_cycle_us, nor more than 3 us longer, and equal to the clock."""
     tb = TB(dut)
@@ -632,7 +639,7 @@ async def shortest_cycle(dut):
     assert not int(dut.cycle_busy_o.value)
 
 
-@cocotb.test(timeout_time=500, timeout_unit="ms")
+@cocotb.test(timeout_time=120, timeout_unit="ms")
 async def empty_cycles(dut):
     """LK-014: without slot and extra request a cycle has no telegram and takes 150 us at least; then slots are found."""
     tb = TB(dut)
@@ -651,7 +658,7 @@ async def empty_cycles(dut):
     assert int(dut.sync_count_o.value) == len(tb.calls)
 
 
-@cocotb.test(timeout_time=900, timeout_unit="ms")
+@cocotb.test(timeout_time=150, timeout_unit="ms")
 async def slots_change_live(dut):
     """LK-001: a slot switched on or off at any moment counts at the latest one cycle later; nothing else changes."""
     tb = TB(dut)
@@ -689,7 +696,7 @@ def random_plant(rng, tb):
                 tb.poke(STATE + index, rng.randrange(16))
 
 
-@cocotb.test(timeout_time=3000, timeout_unit="ms")
+@cocotb.test(timeout_time=900, timeout_unit="ms")
 async def random_plants(dut):
     """LK-001, LK-002, LK-003, LK-004, LK-005, LK-007, LK-008, LK-009, LK-013: hundreds of cycles of random plants,
     failures, outputs, management and inclusion requests against the model."""
@@ -703,7 +710,7 @@ async def random_plants(dut):
         dut.two_extra_i.value = seed % 2
 
         def answer(call, rng=rng, rate=rate):
-            repeats = rng.randrange(4)
+            repeats = rng.choice((0, 0, 0, 0, 1, 2, 3))
             if rng.random() < rate:
                 return rng.randrange(1, 10), rng.randrange(1, 10), rng.randrange(16), repeats
             return OK, rng.randrange(10) if repeats else OK, rng.randrange(16), repeats
@@ -730,7 +737,7 @@ async def random_plants(dut):
     dut._log.info("%d cycles, %d calls, %d words compared", tb.published, len(tb.calls), tb.checked)
 
 
-@cocotb.test(timeout_time=3000, timeout_unit="ms")
+@cocotb.test(timeout_time=400, timeout_unit="ms")
 async def stop_in_a_cycle(dut):
     """LK-013, LK-004, LT-011: enable_i drops at every clock around and inside a cycle: it ends without publication,
     streaks stay, nothing new is offered; afterwards cycles go on as before."""
@@ -739,11 +746,12 @@ async def stop_in_a_cycle(dut):
     await tb.start()
     for index in (1, 33, 20):
         tb.poke(index, 3)
-    tb.answer = lambda call: (NO_RESPONSE, NO_RESPONSE, 0, 0) if call >> 5 == 20 else (OK, OK, 5, 1)
+    tb.answer = lambda call: (NO_RESPONSE, NO_RESPONSE, 0, 0) if call >> 5 == 20 else (OK, OK, 5, 0)
     tb.poke(INCL_REQ, request(0x410, tag=9, valid=1))
     await tb.cycles(1)
     tag, kinds = 0, set()
-    offsets = [*range(0, 70), *range(70, 900, 9), *range(730, 830), *range(1080, 1180), *range(1190, 1480, 2)]
+    offsets = [*range(0, 40), *range(40, 1760, 9), *range(355, 420), *range(755, 830, 2), *range(1150, 1270),
+               *range(1550, 1680)]
     for offset in offsets:
         tag = (tag + 1) % 256
         tb.poke(MGMT_REQ, request(0x400, tag=tag))
@@ -765,9 +773,11 @@ async def stop_in_a_cycle(dut):
         done = int(dut.cycle_count_o.value) - before
         assert tb.peek(CYCLES) == int(dut.cycle_count_o.value)
         if tb.gen is not None:  # the open cycle: an accepted call came back, or one that was only offered was withdrawn
-            expected = None
+            expected, ram = None, tb.model.ram
+            saved = ram[CYCLES], ram[IN_IMG:MGMT_REQ], tb.model.odd
             if tb.pending_result is not None:
                 expected = tb._advance()
+            ram[CYCLES], ram[IN_IMG:MGMT_REQ], tb.model.odd = saved  # stopped after the last call: not published
             for word in (STATE + 1, STATE + 33, STATE + 20, MGMT_RES, INCL_RES):
                 if tb.peek(word) != tb.model.ram[word]:
                     assert expected and tb.peek(word) >> 4 & 0x3FF == ABORTED << 4 | ABORTED, f"word {word:#x}"
@@ -782,9 +792,10 @@ async def stop_in_a_cycle(dut):
                 assert (tb.peek(word) ^ tb.model.ram[word]) & 0x7000F == 0
                 tb.model.ram[word] = tb.peek(word)
             kinds.add("first")
-        tb.model.was_mgmt = False
+        tb.model.was_mgmt = bool(dut.u_dut.was_mgmt_q.value)
         tb.model.ram[OUT_SNAP:IN_WORK] = [tb.peek(k) for k in range(OUT_SNAP, IN_WORK)]
         kinds.add(f"done{done}")
+        tb.dropped = int(dut.begun_count_o.value) - int(dut.cycle_count_o.value)
         tb.compare([k for k in range(256) if not OUT_SNAP <= k < IN_WORK])
         dut.cycle_en_i.value = 0
         dut.enable_i.value = 1
@@ -793,7 +804,7 @@ async def stop_in_a_cycle(dut):
     await tb.cycles(4)
 
 
-@cocotb.test(timeout_time=3000, timeout_unit="ms")
+@cocotb.test(timeout_time=400, timeout_unit="ms")
 async def stop_in_a_batch(dut):
     """LK-010, LT-011: enable_i drops at any clock of a batch: the remaining entries are ABORTED, then batch_done;
     ABORTED is no failure."""
@@ -802,7 +813,7 @@ async def stop_in_a_batch(dut):
     tb.answer = lambda call: (OK, OK, call & 15, 0)
     entries = [request(0x400 + k, tag=0x20 + k) for k in range(4)]
     seen = set()
-    for offset in [*range(0, 30), *range(340, 440), 700, *range(1560, 1640)]:
+    for offset in [*range(0, 30), *range(340, 440), 1000, 1400, *range(1560, 1640)]:
         async def stop(offset=offset):
             await ClockCycles(dut.clk_i, offset + 1)
             await FallingEdge(dut.clk_i)
@@ -815,7 +826,7 @@ async def stop_in_a_batch(dut):
         await task
         dut.enable_i.value = 1
         await ClockCycles(dut.clk_i, GAP)
-    assert seen == {0, 1, 3, 4} and tb.peek(FAILED) == 0
+    assert seen == {0, 1, 2, 3, 4} and tb.peek(FAILED) == 0
     # a batch that starts while the line is off comes back at once
     dut.enable_i.value = 0
     assert await tb.batch(entries) == [e & 0xFF0000 | 0xFF0 for e in entries]
