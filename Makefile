@@ -51,6 +51,13 @@ lint: $(VENV)/.ready  ## Verilator -Wall over the whole chip, three parameter se
 synth: $(VENV)/.synth  ## cells and clock rate on iCE40 UP5K and ECP5-25F (minutes), table and build/synth/numbers.json
 	@$(VPY) syn/synth.py --vexriscv $(VEXRISCV) --out $(BUILD)/synth $(ARGS)
 
+# ---------------------------------------------------------------- firmware
+include firmware/firmware.mk
+
+# ---------------------------------------------------------------- native simulation
+include tb/tb.mk
+
+
 # ---------------------------------------------------------------- clean
 .PHONY: clean
 clean:  ## remove build results, keep the environment
@@ -60,3 +67,27 @@ clean:  ## remove build results, keep the environment
 .PHONY: pytest
 pytest: $(VENV)/.ready  ## run some tests: make pytest ARGS='cocotb_tests/block -k sync'
 	@$(VPY) -m pytest $(ARGS)
+
+# ---------------------------------------------------------------- test
+.PHONY: test
+test: $(VENV)/.ready  ## everything, with one closing line of counts; JUnit and coverage in build/test
+	@rm -rf $(BUILD)/coverage-*.dat $(BUILD)/firmware/coverage && mkdir -p $(BUILD)/test
+	@RTL_COVERAGE=1 $(VPY) -m pytest -n 2 --dist loadfile --junitxml=$(BUILD)/test/junit.xml
+
+# ---------------------------------------------------------------- run
+PLANT ?= sim/plants/packaging.toml
+RUN_LIB = $(BUILD)/tb/libasi_chip$(if $(filter 1,$(WAVES)),_trace).so
+RUN_FW  = $(BUILD)/firmware/asi$(if $(filter 1,$(QUICK)),_test).hex
+.PHONY: run
+run: $(VENV)/.ready $(RUN_LIB) $(RUN_FW)  ## run a plant: make run PLANT=... TIME=1200ms WAVES=1 QUICK=1
+	@$(VPY) -m asi run $(PLANT) $(if $(TIME),--time $(TIME)) $(if $(filter 1,$(WAVES)),--waves) \
+	  $(if $(filter 1,$(QUICK)),--quick) $(RUN_ARGS)
+
+# ---------------------------------------------------------------- requirement matrix, waveform view
+.PHONY: matrix
+matrix: $(VENV)/.ready  ## docs/verification.md: which tests name which requirement, and the gaps
+	@$(VPY) tools/matrix.py
+
+.PHONY: views
+views: $(VENV)/.ready  ## regenerate sim/views/asi.gtkw
+	@$(VPY) tools/gtkw.py

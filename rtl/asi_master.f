@@ -20,4 +20,5 @@ soc/asi_core.sv
 soc/asi_fabric.sv
 soc/asi_spi.sv
 soc/asi_soc.sv
+soc/asi_trace.sv
 asi_master.sv

@@ -32,7 +32,7 @@ typedef struct {
     uint32_t requests, answers;
 } asi_slave_state;
 
-/* faults of one slave's answers; probabilities in 1/65536 per answer, all may be active together */
+/* faults of one slave's answers; probabilities in 1/65536 per answer (65535: always), all may be active together */
 typedef struct {
     uint16_t p_no_answer, p_parity, p_missing_pulse, p_shifted_pulse, p_extra_pulse;
     int32_t  shift_ns;     /* shift used by p_shifted_pulse, e.g. -2000 .. 2000 */
@@ -51,6 +51,8 @@ int      asi_net_power(asi_net *net, uint8_t good);                            /
 /* without a chip: a pulse of the master; then advance to t_ns and collect the slaves' pulses that start until then */
 int      asi_net_master_pulse(asi_net *net, int64_t t_ns, int32_t polarity);
 int      asi_net_advance(asi_net *net, int64_t t_ns, asi_pulse *out, int max);
+/* a pulse of a foreign sender, t_ns not in the past: master and monitor get it, the slaves do not listen to it */
+int      asi_net_inject(asi_net *net, int64_t t_ns, int32_t polarity, int32_t width_ns);
 
 /* one call on the line as the passive monitor (independent of the chip) saw it */
 typedef struct {
@@ -64,16 +66,19 @@ typedef struct {
     uint8_t  request_ok;   /* 0: the request itself was not a legal telegram */
     uint8_t  reserved;
 } asi_telegram;
+int      asi_net_log(asi_net *net, asi_telegram *out, int max);                /* drains, -> count; keeps 2^20 */
 
 typedef struct {
-    uint64_t clocks, telegrams, repeated, failed;
+    uint64_t clocks, telegrams, repeated, failed;           /* failed: every answer that was not OK */
     int64_t  phase_ns[8];                  /* bus time spent with phase_o = n */
-    uint64_t cycles;
-    int64_t  cycle_min_ns, cycle_max_ns, cycle_sum_ns;      /* between sync_o pulses; sum over cycles-1 periods */
+    uint64_t cycles, cycle_periods;        /* sync_o pulses; periods between two of them without a phase < 3 between */
+    int64_t  cycle_min_ns, cycle_max_ns, cycle_sum_ns;      /* of these periods */
     uint64_t irq_count, irq_clocks_max;    /* core busy between leaving and re-entering WAIT, worst case */
 } asi_chip_stats;
 
-asi_chip *asi_chip_new(const char *wave_path, uint64_t seed);  /* NULL: no waves; NULL on failure */
+/* firmware_path: RAM image as $readmemh text, wave_path: NULL = no waves (only the library built with tracing can);
+   NULL on failure: a file that cannot be read or written, waves asked of the wrong library */
+asi_chip *asi_chip_new(const char *firmware_path, const char *wave_path, uint64_t seed);
 void      asi_chip_free(asi_chip *chip);                       /* closes the waveform */
 asi_net  *asi_chip_net(asi_chip *chip);
 uint32_t  asi_chip_clk_hz(const asi_chip *chip);
@@ -83,7 +88,7 @@ int64_t   asi_chip_run_irq(asi_chip *chip, int64_t until_ns);  /* as run, stops 
 uint32_t  asi_chip_host_read(asi_chip *chip, uint32_t byte_addr);                       /* a real bus cycle */
 void      asi_chip_host_write(asi_chip *chip, uint32_t byte_addr, uint32_t data, uint8_t byte_enable);
 void      asi_chip_apf(asi_chip *chip, uint8_t low);           /* pin apf_ni; the slaves follow asi_net_power */
-int       asi_chip_log(asi_chip *chip, asi_telegram *out, int max);                     /* drains, -> count */
+int       asi_chip_log(asi_chip *chip, asi_telegram *out, int max);                     /* as asi_net_log */
 void      asi_chip_get_stats(asi_chip *chip, asi_chip_stats *out);
 /* cffi end */
 #ifdef __cplusplus

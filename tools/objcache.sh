@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # usage: OBJCACHE="objcache.sh DIR", before the compiler in Verilator's makefile. Compiles Verilator's own files once
-# per set of flags instead of once per test bench (10 of the 12 s of a small one); every other file is compiled as usual.
+# per set of flags instead of once per test bench (10 of the 12 s of a small one); every other file as usual.
 set -e
 cache=$1; shift
 source=${!#}

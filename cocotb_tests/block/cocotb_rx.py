@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Receiver. A telegram is a list of (clock after the first pulse, polarity); classify() is the rules once more, in Python."""
+"""Receiver. A telegram is a list of (clock after the first pulse, polarity); classify() is the rules once more, in
+Python."""
 import random
 
 import cocotb
@@ -99,13 +100,18 @@ class TB:
         assert self.clocks(train) == self.grid.pulses(0b0011)
         return train
 
+    def word(self, word):
+        """Pulses of a 7-bit word, legal or not."""
+        return to_clocks(telegram.pulses(word, 7), self.grid.hz)
+
     def clocks(self, train):
         return sorted((round(t * self.grid.hz / 10**6), p) for t, p in train.items())
 
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
 async def good(dut):
-    """TL-002, TL-006, RX-005, RX-006, RX-007: every good telegram (E3, E4, E5 among the answers) gives OK and its payload."""
+    """TL-002, TL-006, RX-005, RX-006, RX-007: every good telegram (E3, E4, E5 among the answers) gives OK and its
+    payload."""
     tb = await TB(dut).start()
     for payload in range(16) if tb.grid.bits == 7 else range(0, 2048, 37):
         await tb.expect(tb.grid.pulses(payload), ErrorClass.OK, payload)
@@ -132,7 +138,8 @@ async def windows(dut):
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
 async def drifting_grid(dut):
-    """RX-010: pulses that drift are judged against the first one only; all at the early or all at the late limit is legal."""
+    """RX-010: pulses that drift are judged against the first one only; all at the early or all at the late limit is
+    legal."""
     tb = await TB(dut).start()
     pulses = tb.grid.pulses(0b0110)
     for limit in (-tb.grid.early, tb.grid.late):
@@ -145,7 +152,8 @@ async def drifting_grid(dut):
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
 async def start_error(dut):
-    """RX-001: a telegram that begins with a positive pulse is a start error, alone and with everything else inverted too."""
+    """RX-001: a telegram that begins with a positive pulse is a start error, alone and with everything else inverted
+    too."""
     tb = await TB(dut).start()
     e3 = tb.e3()
     await tb.expect(tb.clocks({**e3, 0: 1}), ErrorClass.START)
@@ -196,7 +204,8 @@ async def no_information_error(dut):
         for payload in range(16):
             pulses = grid.pulses(payload)
             position = [t for t, _ in pulses].index(n * grid.half)
-            # two neighbours of opposite polarity go, so the rest still alternates; the other one must not be a bit pulse
+            # two neighbours of opposite polarity go, so the rest still alternates; the other one must not be a bit
+            # pulse
             for other in (position - 1, position + 1):
                 if 0 < other < len(pulses) and pulses[other][0] // grid.half % 2:
                     await tb.expect([p for k, p in enumerate(pulses) if k not in (position, other)],
@@ -212,7 +221,7 @@ async def end_bit_error(dut):
     """RX-006: a telegram whose last bit is 0 but is legal otherwise."""
     tb = await TB(dut).start()
     for payload in range(16):
-        await tb.expect(to_clocks(telegram.pulses(telegram.response_word(payload) & ~1, 7), tb.grid.hz), ErrorClass.END_BIT)
+        await tb.expect(tb.word(telegram.response_word(payload) & ~1), ErrorClass.END_BIT)
 
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
@@ -221,13 +230,13 @@ async def parity_error(dut):
     tb = await TB(dut).start()
     for payload in range(16):
         for bit in (2, 4, 32):
-            await tb.expect(to_clocks(telegram.pulses(telegram.response_word(payload) ^ bit, 7), tb.grid.hz), ErrorClass.PARITY)
+            await tb.expect(tb.word(telegram.response_word(payload) ^ bit), ErrorClass.PARITY)
 
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
 async def length_error(dut):
-    """RX-007: a pulse of either polarity after the end pulse, from the next clock to 43.5 us inclusive; one clock later it is
-    no part of the telegram. The end pulse may come early or late."""
+    """RX-007: a pulse of either polarity after the end pulse, from the next clock to 43.5 us inclusive; one clock
+    later it is no part of the telegram. The end pulse may come early or late."""
     tb = await TB(dut).start()
     grid = tb.grid
     pulses = grid.pulses(0b0011)
@@ -257,7 +266,7 @@ async def examples_e12(dut):
     await tb.expect(tb.clocks(without(24)), ErrorClass.ALTERNATION)  # and no information, which ranks lower
     await tb.expect(tb.clocks({**without(21), 19.8: -1}), ErrorClass.TIMING)
     await tb.expect(tb.clocks(without(21, 24)), ErrorClass.NO_INFORMATION)
-    await tb.expect(to_clocks(telegram.pulses(0b0001111, 7), tb.grid.hz), ErrorClass.PARITY)
+    await tb.expect(tb.word(0b0001111), ErrorClass.PARITY)
     await tb.expect(tb.clocks({**e3, 39: -1}), ErrorClass.LENGTH)
     await tb.expect(tb.clocks({**e3, 0: 1}), ErrorClass.START)
 
@@ -269,19 +278,20 @@ async def reporting_order(dut):
     e3 = tb.e3()
     us = tb.clocks
     positive = {0: 1}
-    # a fault of each rank that leaves room for the lower ones; the length fault comes last in time, the parity fault first
+    # a fault of each rank that leaves room for the lower ones; the length fault comes last in time, the parity fault
+    # first
     await tb.expect(us({**e3, **positive, 19.75: -1}), ErrorClass.START)                                # + timing
     await tb.expect(us({**e3, **positive, 39: -1}), ErrorClass.START)                                   # + length
     await tb.expect(us({**e3, 9: -1, 19.75: -1}), ErrorClass.ALTERNATION)                               # + timing
     await tb.expect(us({t: p for t, p in e3.items() if t != 36}), ErrorClass.NO_INFORMATION)
     no_bit = {t: p for t, p in e3.items() if t not in (21, 24)}
-    await tb.expect(us({**{t: p for t, p in no_bit.items() if t != 3}, 4.75: 1}), ErrorClass.TIMING)     # + no information
+    await tb.expect(us({**{t: p for t, p in no_bit.items() if t != 3}, 4.75: 1}), ErrorClass.TIMING)  # + no information
     await tb.expect(us({**no_bit, 39: -1}), ErrorClass.NO_INFORMATION)                                  # + length
-    end0 = to_clocks(telegram.pulses(telegram.response_word(3) & ~1, 7), tb.grid.hz)
-    odd_end0 = to_clocks(telegram.pulses(telegram.response_word(3) ^ 3, 7), tb.grid.hz)
+    end0 = tb.word(telegram.response_word(3) & ~1)
+    odd_end0 = tb.word(telegram.response_word(3) ^ 3)
     await tb.expect(odd_end0, ErrorClass.END_BIT)                                                       # + parity
     await tb.expect([*end0, (13 * tb.grid.half, 1)], ErrorClass.END_BIT)                                # + length
-    odd = to_clocks(telegram.pulses(telegram.response_word(3) ^ 2, 7), tb.grid.hz)
+    odd = tb.word(telegram.response_word(3) ^ 2)
     await tb.expect([*odd, (13 * tb.grid.half, -1)], ErrorClass.PARITY)                                 # + length
 
 

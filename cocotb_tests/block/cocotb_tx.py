@@ -6,14 +6,14 @@ from cocotb_tests.block.phy_bench import now, start, to_clocks, until, wait, wat
 
 # E1 .. E11: (name, call, request word, pulses of the example in us, sign = polarity)
 EXAMPLES = (
-    ("E1", telegram.encode_call("DEXG", 5, 0b1010), 0x02A9, "-0 +3 -6 +9 -12 +15 -18 +24 -30 +36 -42 +48 -54 +60 -66 +69 "
-     "-72 +78"),
-    ("E2", telegram.encode_call("DEXG", 5, 0b0101), 0x0295, "-0 +3 -6 +9 -12 +15 -18 +24 -30 +36 -42 +45 -48 +54 -60 +66 "
-     "-72 +78"),
+    ("E1", telegram.encode_call("DEXG", 5, 0b1010), 0x02A9, "-0 +3 -6 +9 -12 +15 -18 +24 -30 +36 -42 +48 -54 +60 -66 "
+     "+69 -72 +78"),
+    ("E2", telegram.encode_call("DEXG", 5, 0b0101), 0x0295, "-0 +3 -6 +9 -12 +15 -18 +24 -30 +36 -42 +45 -48 +54 -60 "
+     "+66 -72 +78"),
     ("E6", telegram.encode_call("WPAR", 12, 0b0110), 0x065B, "-0 +3 -6 +9 -12 +18 -21 +24 -30 +33 -36 +42 -48 +54 -57 "
      "+60 -66 +72 -75 +78"),
-    ("E7", telegram.encode_call("ADRA", 0, 7), 0x001F, "-0 +3 -6 +9 -12 +15 -18 +21 -24 +27 -30 +33 -36 +39 -42 +45 -48 "
-     "+54 -57 +60 -63 +66 -69 +72 -75 +78"),
+    ("E7", telegram.encode_call("ADRA", 0, 7), 0x001F, "-0 +3 -6 +9 -12 +15 -18 +21 -24 +27 -30 +33 -36 +39 -42 +45 "
+     "-48 +54 -57 +60 -63 +66 -69 +72 -75 +78"),
     ("E8", telegram.encode_call("BR01"), 0x1FD7, "-.+-+-+-+-+-+-+.-.+.-.+-+-+"),
     ("E9A", telegram.encode_call("DEXG", 5, 0b101, True), 0x02B7, "-+-+-+-.+.-.+.-.+-+.-.+-+-+"),
     ("E9B", telegram.encode_call("DEXG", 37, 0b101, True), 0x0295, "-+-+-+-.+.-.+.-+-.+.-.+.-.+"),
@@ -21,7 +21,8 @@ EXAMPLES = (
     ("E10D", telegram.encode_call("DEXG", 5, 15), 0x02BD, None),
     *((f"E11 {name} {index}", telegram.encode_call(name, index), word, None) for name, a, b in (
         ("DELA", 0x1283, 0x12A1), ("RES", 0x12F1, 0x12D3), ("RDIO", 0x12C1, 0x12E3), ("RDID", 0x12C7, 0x12E5),
-        ("RID1", 0x12CB, 0x12E9), ("RID2", 0x12CD, 0x12EF), ("RDST", 0x12FB, 0x12D9)) for index, word in ((5, a), (37, b))),
+        ("RID1", 0x12CB, 0x12E9), ("RID2", 0x12CD, 0x12EF), ("RDST", 0x12FB, 0x12D9))
+      for index, word in ((5, a), (37, b))),
     ("E11 WID1 7", telegram.encode_call("WID1", 0, 7), 0x101D, None),
     ("E11 WID1 F", telegram.encode_call("WID1", 0, 15), 0x103F, None),
 )
@@ -62,7 +63,8 @@ def edges(signal):
 
 @cocotb.test(timeout_time=2, timeout_unit="ms")
 async def examples(dut):
-    """TL-001, TL-004, TL-005, TL-006, LT-001: E1, E2, E6 .. E11 leave the transmitter edge by edge, exact to the clock."""
+    """TL-001, TL-004, TL-005, TL-006, LT-001: E1, E2, E6 .. E11 leave the transmitter edge by edge, exact to the
+    clock."""
     hz = await begin(dut)
     man, enable, last = edges(dut.tx_man_o), edges(dut.tx_en_o), watch(dut.last_o)
     for name, call, word, text in EXAMPLES:
@@ -97,7 +99,7 @@ async def all_calls(dut):
             await wait(half)
         word = telegram.request_word(call)
         bits = [word >> (13 - k) & 1 for k in range(14)]
-        halves = [level for bit in bits for level in (1 - bit, bit)][1:]  # the first half of the start bit is the idle level
+        halves = [level for bit in bits for level in (1 - bit, bit)][1:]  # the start bit begins with the idle level
         assert levels == halves, f"call {call:#x}"
         pulses = [(k * 3000, 1 if level else -1) for k, level in enumerate(levels) if level != ([1] + levels)[k]]
         assert pulses == telegram.request_pulses(call), f"call {call:#x}"
@@ -105,7 +107,8 @@ async def all_calls(dut):
 
 @cocotb.test(timeout_time=100, timeout_unit="us")
 async def arm(dut):
-    """LT-009: tx_en rises one clock after arm_i, stays through the request without a gap and falls 81 us after its start."""
+    """LT-009: tx_en rises one clock after arm_i, stays through the request without a gap and falls 81 us after its
+    start."""
     hz = await begin(dut)
     enable, man = edges(dut.tx_en_o), edges(dut.tx_man_o)
     dut.arm_i.value = 1

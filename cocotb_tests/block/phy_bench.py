@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of rtl/phy share. All times are clocks.
 
-The simulated clock has a period of 10 ns whatever ClkHz says: the modules only know clocks. Rising edge k is at 10 k ns.
-Tests live in the middle of clocks (10 k + 5 ns): what they drive there counts as an edge on the pin at clock edge k, and
-now() is k. So a difference of two now() or edge numbers is what an oscilloscope would show.
+The simulated clock has a period of 10 ns whatever ClkHz says: the modules only know clocks. Rising edge k is at 10 k
+ns. Tests live in the middle of clocks (10 k + 5 ns): what they drive there counts as an edge on the pin at clock edge
+k, and now() is k. So a difference of two now() or edge numbers is what an oscilloscope would show.
 """
 import cocotb
 from cocotb.clock import Clock
@@ -47,7 +47,7 @@ async def start(dut, **inputs):
 def watch(strobe, *values):
     """-> list that grows by (clock, *values) for each clock with strobe high, as the next clock edge samples it.
 
-    The strobe has to be low between two hits. Sampling late in the clock keeps delta glitches out.
+    A strobe longer than one clock fails the test. Sampling late in the clock keeps delta glitches out.
     """
     hits = []
 
@@ -58,6 +58,8 @@ def watch(strobe, *values):
             await Timer((clock + 1) * PERIOD - 1 - int(get_sim_time("ns")), "ns")
             if strobe.value == 1:
                 hits.append((clock, *(int(v.value) for v in values)))
+                await Timer(PERIOD, "ns")
+                assert strobe.value == 0, f"{strobe._name} is longer than one clock"
     cocotb.start_soon(run())
     return hits
 

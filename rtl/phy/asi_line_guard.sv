@@ -35,8 +35,10 @@ module asi_line_guard #(
     end
     if (good_q != apf_o) cnt_d = '0;      // they agree: power good, no fail, or the other way round
     else if (tick_i) begin
-      cnt_d = cnt_q + 1'b1;
-      if (cnt_q == (apf_o ? CntW'(OkTicks - 1) : CntW'(OnTicks - 1))) begin apf_d = !apf_o; cnt_d = '0; end
+      if (cnt_q != (apf_o ? CntW'(OkTicks - 1) : CntW'(OnTicks - 1))) cnt_d = cnt_q + 1'b1;
+      else if (good == good_q) begin      // else wait: the state may have ended, that is a dip so far
+        apf_d = !apf_o;  cnt_d = '0;
+      end
     end
   end
 

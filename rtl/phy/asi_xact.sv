@@ -87,7 +87,7 @@ module asi_xact
   asi_pulse_filter #(.ClkHz(ClkHz), .FilterNs(FilterNs)) i_filter_p (.clk_i, .rst_i, .pulse_i(rx_p), .start_o(p_start));
   asi_pulse_filter #(.ClkHz(ClkHz), .FilterNs(FilterNs)) i_filter_n (.clk_i, .rst_i, .pulse_i(rx_n), .start_o(n_start));
   asi_tx #(.ClkHz(ClkHz), .HalfBitNs(HalfBitNs)) i_tx (
-    .clk_i, .rst_i, .start_i(start), .arm_i(armed_q && enable_i && (open_q || req_valid_i)),
+    .clk_i, .rst_i, .start_i(start), .arm_i(armed_q && (open_q || req_valid_i)),
     .call_i(open_q ? call_q : req_call_i), .busy_o(tx_busy), .last_o(tx_last), .tx_man_o, .tx_en_o
   );
   asi_rx #(

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+import cocotb
+from cocotb.clock import Clock
+from cocotb.triggers import FallingEdge
+
+from asi.plant import address_name
+from asi.regmap import ErrorClass, Phase
+from asi.telegram import decode_call, encode_call
+
+
+def text(signal):
+    return int(signal.value).to_bytes(14, "big").decode("ascii").rstrip()
+
+
+def expected(call, extended):
+    """The request text by way of asi.telegram, which knows nothing of the module."""
+    decoded, number = decode_call(call, lambda n: n in extended), call >> 5 & 31
+    if decoded.name in ("BR01", "PRGM"):
+        return f"{decoded.name} all"
+    width = {"ADRA": 5, "WID1": 4, "DEXG": 3 if number in extended else 4,
+             "WPAR": 3 if number in extended else 4}.get(decoded.name)
+    data = "" if width is None or decoded.data is None else f"{decoded.data:0{width}b}"
+    return f"{decoded.name:<4} {address_name(decoded.index, number in extended):<3} {data}".rstrip()
+
+
+async def start(dut):
+    Clock(dut.clk_i, 10, unit="ns").start()
+    for name in ("req_i", "req_call_i", "res_i", "res_class_i", "res_data_i", "phase_i"):
+        getattr(dut, name).value = 0
+    dut.rst_i.value = 1
+    await FallingEdge(dut.clk_i)
+    await FallingEdge(dut.clk_i)
+    dut.rst_i.value = 0
+
+
+async def request(dut, call):
+    dut.req_i.value, dut.req_call_i.value = 1, call
+    await FallingEdge(dut.clk_i)
+    dut.req_i.value = 0
+
+
+async def result(dut, error, data=0):
+    dut.res_i.value, dut.res_class_i.value, dut.res_data_i.value = 1, int(error), data
+    await FallingEdge(dut.clk_i)
+    dut.res_i.value = 0
+
+
+@cocotb.test(timeout_time=1, timeout_unit="ms")
+async def every_call_reads_right(dut):
+    """PL-003: the request text of all 2048 calls, before and after RDID has shown which numbers use A/B addressing."""
+    await start(dut)
+    for extended in (set(), {5, 17, 31}):
+        for number in extended:
+            await request(dut, encode_call("RDID", number))
+            await result(dut, ErrorClass.OK, 0xA)
+        for call in range(2048):
+            await request(dut, call)
+            assert text(dut.request_text_o) == expected(call, extended), f"{call:011b}"
+            assert text(dut.answer_text_o) == "..."
+    await request(dut, encode_call("RDID", 5))  # a standard slave has taken the place
+    await result(dut, ErrorClass.OK, 0x0)
+    await request(dut, encode_call("DEXG", 5, 0b0101))
+    assert text(dut.request_text_o) == "DEXG 5   0101"
+
+
+@cocotb.test(timeout_time=1, timeout_unit="ms")
+async def answers_and_phases_read_right(dut):
+    """PL-003: the answer text is the nibble or the class, the phase text the phase; a broadcast has no answer."""
+    await start(dut)
+    for error in ErrorClass:
+        for data in range(16):
+            await request(dut, encode_call("RDIO", 9))
+            await result(dut, error, data)
+            assert text(dut.answer_text_o) == (f"{data:04b}" if error == ErrorClass.OK else error.name)
+    await request(dut, encode_call("BR01"))
+    await result(dut, ErrorClass.OK)
+    assert text(dut.answer_text_o) == "none"
+    for phase in Phase:
+        dut.phase_i.value = int(phase)
+        await FallingEdge(dut.clk_i)
+        assert text(dut.phase_text_o) == phase.name
+
+
+@cocotb.test(timeout_time=1, timeout_unit="ms")
+async def last_data_per_slave(dut):
+    """PL-003: a nibble per index holds the last DEXG data and the last valid DEXG answer, and nothing else moves it."""
+    await start(dut)
+    await request(dut, encode_call("RDID", 7))
+    await result(dut, ErrorClass.OK, 0xA)
+    story = (("DEXG", 3, 0b1010, ErrorClass.OK, 0b0110), ("DEXG", 7 + 32, 0b101, ErrorClass.OK, 0b1001),
+             ("DEXG", 7, 0b011, ErrorClass.OK, 0b0011), ("DEXG", 3, 0b0001, ErrorClass.PARITY, 0b1111),
+             ("WPAR", 3, 0b0111, ErrorClass.OK, 0b0111))
+    outputs, inputs = [15] * 64, [0] * 64
+    for name, index, data, error, answer in story:
+        call = encode_call(name, index, data, extended=index & 31 == 7)
+        await request(dut, call)
+        await result(dut, error, answer)
+        if name == "DEXG":
+            outputs[index] = call & 15
+            if error == ErrorClass.OK:
+                inputs[index] = answer
+        for signal, nibbles in ((dut.outputs_o, outputs), (dut.inputs_o, inputs)):
+            value = int(signal.value)
+            assert [value >> 4 * index & 15 for index in range(64)] == nibbles

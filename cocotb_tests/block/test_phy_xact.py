@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+import pytest
+
+from cocotb_tests.cocotb_run import run_cocotb
+
+XACT = [f"phy/asi_{name}.sv" for name in ("sync", "pulse_filter", "tx", "rx", "xact")]
+
+
+@pytest.mark.parametrize("mhz", [8, 16, 48])
+def test_xact(mhz):
+    run_cocotb("asi_xact", XACT, "cocotb_tests.block.cocotb_xact", parameters={"ClkHz": mhz * 10**6})
+
+
+def test_line_guard():
+    run_cocotb("asi_line_guard", ["phy/asi_sync.sv", "phy/asi_line_guard.sv"], "cocotb_tests.block.cocotb_line_guard")

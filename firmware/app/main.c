@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/** @file main.c  Line work in the interrupt; commits of the host in the main loop, which else sleeps. */
+#include "asi_hal.h"
+#include "asi_window.h"
+
+static asi_ec_t ec;
+static uint32_t last_us;
+
+void asi_interrupt(void);
+
+/** The one interrupt (startup.S). Bounded: each event is served once, at most 64 results, slaves or codes each. */
+void asi_interrupt(void)
+{
+    const uint32_t events = hal_take_events();
+    bool publish = false;
+
+    if (events & HAL_APF_CHANGE)
+        asi_ec_power(&ec, hal_apf()); /* first: what a power fail has spoilt is not to be used */
+    if (events & HAL_BATCH_DONE) {
+        const asi_result_t *results;
+        const unsigned n = hal_batch_results(&results);
+        (void)asi_ec_batch_done(&ec, results, n); /* refused: a batch that was given up */
+    }
+    if (events & HAL_SLAVE_LOST) {
+        for (unsigned i = hal_next_lost(0); i < ASI_INDICES; i = hal_next_lost(i + 1u))
+            (void)asi_ec_slave_lost(&ec, i);
+    }
+    if (events & HAL_CYCLE_DONE) {
+        asi_cycle_report_t report;
+        hal_cycle_report(&report);
+        asi_window_take_outputs(&ec);
+        publish = asi_ec_cycle_done(&ec, &report) == ASI_OK; /* else: the last cycle before OFFLINE */
+    }
+    if (events & HAL_TICK) {
+        const uint32_t now = hal_time_us();
+        asi_ec_tick(&ec, now - last_us);
+        last_us = now;
+        if (!hal_stack_intact())
+            hal_fatal();
+    }
+    /* outside running cycles a change of phase, flags or lists is news enough */
+    if (publish || (asi_ec_state(&ec)->phase != ASI_PHASE_DATA_EXCHANGE && asi_window_is_stale(&ec)))
+        asi_window_publish(&ec);
+}
+
+int main(void)
+{
+    hal_init();
+    asi_ec_init(&ec, asi_window_init());
+    asi_ec_power(&ec, hal_apf());
+    last_us = hal_time_us();
+    asi_window_open(&ec);
+    hal_start();
+    for (;;) {
+        while (asi_window_serve(&ec)) {
+        }
+        hal_sleep();
+    }
+}

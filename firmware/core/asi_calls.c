@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/** @file asi_calls.c  The call table. */
+#include "asi_calls.h"
+
+#define CB 0x400u     /* command bit */
+#define I4_WPAR 0x10u /* CB 0: parameter instead of data */
+#define I3 0x08u
+
+static uint16_t payload(unsigned cb, unsigned index, unsigned info)
+{
+    return (uint16_t)(cb | (index & 31u) << 5 | (info & 31u));
+}
+
+/** D3 or ~Sel, D2..D0 */
+static unsigned nibble(unsigned index, unsigned data, bool extended)
+{
+    if (index & 32u)
+        return data & 7u;
+    return extended ? (data & 7u) | I3 : data & 15u;
+}
+
+uint16_t asi_call_dexg(unsigned index, unsigned data, bool extended)
+{
+    return payload(0, index, nibble(index, data, extended));
+}
+
+uint16_t asi_call_wpar(unsigned index, unsigned parameter, bool extended)
+{
+    return payload(0, index, I4_WPAR | nibble(index, parameter, extended));
+}
+
+uint16_t asi_call_adra(unsigned number)
+{
+    return payload(0, 0, number);
+}
+
+uint16_t asi_call_wid1(unsigned id1)
+{
+    return payload(CB, 0, id1 & 15u);
+}
+
+uint16_t asi_call_command(asi_command_t command, unsigned index)
+{
+    return payload(CB, index, (unsigned)command ^ ((index & 32u) ? I3 : 0u));
+}
+
+bool asi_call_is_legal(uint16_t call)
+{
+    const unsigned number = (unsigned)call >> 5 & 31u;
+    const unsigned info = call & 31u;
+    if (call >= 0x800u)
+        return false;
+    if (!(call & CB)) /* DEXG, WPAR; at address 0 ADRA */
+        return true;
+    if (call == ASI_CALL_BR01)
+        return true;
+    if (number == 0u && info < 16u) /* WID1; 0 to address 0 is DELA there, without effect */
+        return info != 0u;
+    switch (info & ~I3) {
+    case 0x00:               /* DELA */
+    case 0x10: case 0x11: case 0x12: case 0x13: /* RDIO RDID RID1 RID2 */
+    case 0x14:               /* RES: 11100, B 10100 */
+    case 0x16:               /* RDST: 11110, B 10110 */
+        return true;
+    default: /* PRGM 11101, Read_Reset_Status 11111, reserved codes */
+        return false;
+    }
+}

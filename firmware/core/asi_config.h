@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/**
+ * @file asi_config.h  Constants of execution control: names as in docs/requirements.md, units in the name or the comment.
+ * Each may be overridden with -D (ASI_PWR_SETTLE_US for test images). Line timing lives in rtl/phy/asi_timing_pkg.sv.
+ */
+#ifndef ASI_CONFIG_H
+#define ASI_CONFIG_H
+
+#define ASI_INDICES 64u     /**< slave indices: number + 32 * Sel; 32 is never used */
+#define ASI_IMAGE_WORDS 8u  /**< eight nibbles a word */
+
+/** P_PWR_SETTLE, us: good line voltage after power-up before the first detection pass (EX-003). */
+#ifndef ASI_PWR_SETTLE_US
+#define ASI_PWR_SETTLE_US 1000000u
+#endif
+/** P_CMD_RETRY, repetitions: failed detection, activation, management and inclusion follow-up calls (EX-010). */
+#ifndef ASI_CMD_RETRY
+#define ASI_CMD_RETRY 2u
+#endif
+/** P_INCL_MISS, rounds: a detected, not active slave that misses these leaves LDS (EX-014). */
+#ifndef ASI_INCL_MISS
+#define ASI_INCL_MISS 3u
+#endif
+/** P_INVERT_OUT, 0 or 1: payload output bits are inverted between host and line (CA-005). */
+#ifndef ASI_INVERT_OUT
+#define ASI_INVERT_OUT 1
+#endif
+/** P_EXTRA_CALLS, 1 or 2: extra slots in each cycle (LK-008, LK-009). */
+#ifndef ASI_EXTRA_CALLS
+#define ASI_EXTRA_CALLS 1
+#endif
+/** P_MIN_CYCLE_US, us, 0 = no limit: shortest cycle with active slaves (LK-014). */
+#ifndef ASI_MIN_CYCLE_US
+#define ASI_MIN_CYCLE_US 0u
+#endif
+/** us: shortest cycle while no slave is active; the cycle is a lone probe then and need not spin (LK-014). */
+#ifndef ASI_EMPTY_CYCLE_US
+#define ASI_EMPTY_CYCLE_US 1000u
+#endif
+
+/** P_FAIL_CYCLES, cycles: the sequencer's limit of failed cycles in a row, SLOT_STATE.streak of a lost slave (LK-004). */
+#define ASI_FAIL_CYCLES 3u
+
+_Static_assert(ASI_CMD_RETRY <= 3u, "the request word has two bits for repetitions");
+_Static_assert(ASI_EXTRA_CALLS == 1 || ASI_EXTRA_CALLS == 2, "one or two extra slots");
+_Static_assert(ASI_INCL_MISS >= 1u && ASI_INCL_MISS <= 255u, "kept in a byte");
+_Static_assert(ASI_MIN_CYCLE_US <= 8191u && ASI_EMPTY_CYCLE_US <= 8191u, "CTRL.min_cycle_us has 13 bits");
+#endif

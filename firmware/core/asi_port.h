@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/**
+ * @file asi_port.h  What the protocol core needs from below. The HAL implements it on link RAM and registers
+ * (firmware/hal/asi_hal.c), the native build on a fake sequencer (firmware/tests/native.c).
+ * Reports come back through asi_ec_batch_done, asi_ec_cycle_done, asi_ec_slave_lost and asi_ec_power.
+ */
+#ifndef ASI_PORT_H
+#define ASI_PORT_H
+#include <stdbool.h>
+#include <stdint.h>
+#include "asi_config.h"
+#include "asi_enums.h"
+
+/** One call on the line. */
+typedef struct {
+    uint16_t call;    /**< 11 bits, asi_calls.h */
+    uint8_t retries;  /**< immediate repetitions after a failure, 0..3 */
+    uint8_t tag;      /**< management and inclusion: comes back with the result */
+    bool no_reply;    /**< broadcast: no answer is expected */
+} asi_request_t;
+
+/** What came of it. */
+typedef struct {
+    uint8_t data;   /**< answer nibble, valid when error is ASI_ERR_OK */
+    uint8_t error;  /**< asi_error_class_t of the last attempt */
+    uint8_t tag;    /**< tag of the request */
+} asi_result_t;
+
+/** Let telegrams out, or not: then an open call and all that follow it in a batch or cycle end as ABORTED. */
+void asi_port_line(bool on);
+/** True when neither a batch nor a cycle is running. */
+bool asi_port_idle(void);
+/** Run n (1..64) requests back to back; only when idle. The requests are copied. */
+void asi_port_batch(const asi_request_t *requests, unsigned n);
+/** Run cycles, or stop after the present one. min_cycle_us: shortest period, 0 = none. May be repeated at any time. */
+void asi_port_cycle(bool run, bool two_extra, uint16_t min_cycle_us);
+/** Call this index in the cycle, or not. extended: I3 of the call is ~Sel. */
+void asi_port_slot(unsigned index, bool active, bool extended);
+/** One call for the next management slot; only when the last one has been reported. */
+void asi_port_management(const asi_request_t *request);
+/** The call of all inclusion slots from now on; NULL: none. */
+void asi_port_inclusion(const asi_request_t *request);
+/** Output nibbles at line level, taken at the start of a cycle, all or nothing. */
+void asi_port_outputs(const uint32_t image[ASI_IMAGE_WORDS]);
+/** Phase to show outside running cycles. */
+void asi_port_phase(asi_phase_t phase);
+#endif

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+# Firmware images: product, test (short P_PWR_SETTLE), boot ROM. Included from the top Makefile.
+FW       := $(BUILD)/firmware
+FW_CC    := $(VPY) -m ziglang cc
+# generic_rv32 is RV32I; -fno-builtin keeps memset from calling itself; all of RAM is ours, so -fno-delete-null-pointer-checks
+FW_FLAGS := -target riscv32-freestanding-none -mcpu=generic_rv32 -mabi=ilp32 -std=c17 -Os -fno-unroll-loops -mno-relax \
+            -ffreestanding -fno-builtin -fno-sanitize=all -fno-delete-null-pointer-checks -ffunction-sections -fdata-sections \
+            -Wall -Wextra -Wconversion -Wshadow -Werror -Wframe-larger-than=256 -Wvla \
+            $(addprefix -Ifirmware/,hal/include core hal app generated)
+FW_LINK  := -nostdlib -static -Wl,--gc-sections
+FW_SRC   := firmware/hal/startup.S $(wildcard firmware/core/*.c firmware/hal/*.c firmware/app/*.c)
+FW_DEPS  := $(FW_SRC) $(wildcard firmware/*/*.h firmware/hal/include/*.h) firmware/hal/firmware.ld firmware/firmware.mk \
+            tools/elf2hex.py
+FW_RAM   := $(shell echo $$((62 * 1024)))  # 64 KB without the stack
+
+.PHONY: firmware
+firmware: $(FW)/asi.hex $(FW)/asi_test.hex $(FW)/boot.hex  ## firmware images in build/firmware, with a size report
+
+$(FW)/asi.elf: FW_DEFS :=
+$(FW)/asi_test.elf: FW_DEFS := -DASI_PWR_SETTLE_US=20000
+$(FW)/asi.elf $(FW)/asi_test.elf: $(FW_DEPS) | $(VENV)/.ready
+	@mkdir -p $(@D)
+	@$(FW_CC) $(FW_FLAGS) $(FW_DEFS) $(FW_LINK) -T firmware/hal/firmware.ld $(FW_SRC) -o $@
+
+$(FW)/asi.hex $(FW)/asi_test.hex: %.hex: %.elf tools/elf2hex.py
+	@$(VPY) tools/elf2hex.py $< --hex $@ --bin $*.bin --flash $*.flash --ram $(FW_RAM)
+
+$(FW)/boot.elf: $(wildcard firmware/boot/*) $(FW_DEPS) | $(VENV)/.ready
+	@mkdir -p $(@D)
+	@$(FW_CC) $(FW_FLAGS) $(FW_LINK) -T firmware/boot/boot.ld firmware/boot/boot_start.S firmware/boot/boot.c -o $@
+
+$(FW)/boot.hex: $(FW)/boot.elf tools/elf2hex.py
+	@$(VPY) tools/elf2hex.py $< --hex $@ --limit 1024
+
+.PHONY: firmware-coverage
+firmware-coverage: $(VENV)/.ready  ## native firmware tests with line and branch coverage of firmware/core (needs gcov)
+	@rm -rf $(FW)/native
+	@FW_COVERAGE=1 $(VPY) -m pytest firmware/tests -k 'not image'
+	@cd $(FW)/native && gcov -b -n *.gcda | grep -A3 "File.*firmware/core"

@@ -1,0 +1,202 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/** @file asi_hal.c  The port of the core on registers and link RAM, and the events. */
+#include "asi_hal.h"
+#include "asi_hw.h"
+#include "hal_vexriscv.h"
+
+_Static_assert(HAL_CYCLE_DONE == ASI_REGS__EVENT__CYCLE_DONE_bm && HAL_BATCH_DONE == ASI_REGS__EVENT__BATCH_DONE_bm &&
+               HAL_SLAVE_LOST == ASI_REGS__EVENT__SLAVE_LOST_bm && HAL_APF_CHANGE == ASI_REGS__EVENT__APF_CHANGE_bm &&
+               HAL_TICK == ASI_REGS__EVENT__TICK_bm && HAL_HOST_ATTN == ASI_REGS__EVENT__HOST_ATTN_bm &&
+               HAL_ALL_EVENTS == ASI_REGS__EVENT_EN__MASK_bm, "rdl/asi.rdl and asi_hal.h differ");
+
+static uint32_t ctrl;      /* CTRL as written */
+static asi_list_t slots;   /* SLOT.active as written */
+static unsigned batch_len;
+static asi_result_t results[ASI_INDICES];
+
+static uint32_t request_word(const asi_request_t *request)
+{
+    return request->call | (request->no_reply ? REQUEST_R__NO_REPLY_bm : 0u) |
+           (uint32_t)request->retries << REQUEST_R__RETRIES_bp | (uint32_t)request->tag << REQUEST_R__TAG_bp;
+}
+
+static asi_result_t result_of(uint32_t word)
+{
+    return (asi_result_t){.data = word & RESULT_R__DATA_bm,
+                          .error = (uint8_t)((word & RESULT_R__LAST_bm) >> RESULT_R__LAST_bp),
+                          .tag = (uint8_t)((word & RESULT_R__TAG_bm) >> RESULT_R__TAG_bp)};
+}
+
+/* ------------------------------------------------------------------------------------------ port of the core */
+
+void asi_port_line(bool on)
+{
+    ctrl = on ? ctrl | ASI_REGS__CTRL__LINE_EN_bm : ctrl & ~(uint32_t)ASI_REGS__CTRL__LINE_EN_bm;
+    REG(CTRL) = ctrl;
+}
+
+bool asi_port_idle(void)
+{
+    return (REG(STATUS) & (ASI_REGS__STATUS__BATCH_BUSY_bm | ASI_REGS__STATUS__CYCLE_BUSY_bm)) == 0u;
+}
+
+void asi_port_batch(const asi_request_t *requests, unsigned n)
+{
+    REG(EVENT) = HAL_BATCH_DONE; /* of a batch that was given up */
+    for (unsigned k = 0; k < n; k++)
+        LINK(BATCH)[k] = request_word(&requests[k]);
+    batch_len = n;
+    REG(BATCH) = n;
+}
+
+void asi_port_cycle(bool run, bool two_extra, uint16_t min_cycle_us)
+{
+    const bool starts = run && !(ctrl & ASI_REGS__CTRL__CYCLE_EN_bm);
+    ctrl &= ASI_REGS__CTRL__LINE_EN_bm;
+    if (run)
+        ctrl |= ASI_REGS__CTRL__CYCLE_EN_bm | (two_extra ? ASI_REGS__CTRL__TWO_EXTRA_bm : 0u) |
+                (uint32_t)min_cycle_us << ASI_REGS__CTRL__MIN_CYCLE_US_bp;
+    if (starts) { /* nothing of an earlier session may show: the sequencer is idle, so its words are ours */
+        REG(EVENT) = HAL_CYCLE_DONE | HAL_SLAVE_LOST;
+        LINK(MGMT_REQ)[0] = LINK(MGMT_RES)[0] & RESULT_R__TAG_bm; /* withdraws an open request */
+        for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++) {
+            LINK(IN_WORK)[w] = 0;
+            LINK(IN_IMG)[w] = 0;
+        }
+    }
+    REG(CTRL) = ctrl;
+}
+
+void asi_port_slot(unsigned index, bool active, bool extended)
+{
+    if (active) {
+        asi_list_add(&slots, index);
+        LINK(SLOT_STATE)[index] = 0; /* before active: the sequencer skips a slot with a full streak */
+    } else {
+        asi_list_remove(&slots, index);
+    }
+    LINK(SLOT)[index] = (active ? SLOT_R__ACTIVE_bm : 0u) | (extended ? SLOT_R__EXTENDED_bm : 0u);
+}
+
+void asi_port_management(const asi_request_t *request)
+{
+    LINK(MGMT_REQ)[0] = request_word(request);
+}
+
+void asi_port_inclusion(const asi_request_t *request)
+{
+    LINK(INCL_REQ)[0] = request ? request_word(request) | REQUEST_R__VALID_bm : 0u;
+}
+
+void asi_port_outputs(const uint32_t image[ASI_IMAGE_WORDS])
+{
+    REG(CTRL) = ctrl | ASI_REGS__CTRL__OUT_HOLD_bm; /* a cycle that starts meanwhile keeps its last snapshot */
+    for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++)
+        LINK(OUT_IMG)[w] = image[w];
+    REG(CTRL) = ctrl;
+}
+
+void asi_port_phase(asi_phase_t phase)
+{
+    REG(EXEC) = (uint32_t)phase;
+}
+
+/* ------------------------------------------------------------------------------------------ application */
+
+void hal_init(void)
+{
+    REG(EVENT_EN) = 0;
+    ctrl = 0;
+    REG(CTRL) = 0;
+    while (!asi_port_idle()) { /* only after a restart of the program: the open batch or cycle runs out */
+    }
+    for (unsigned w = 0; w < sizeof(asi_link_ram_t) / 4u; w++)
+        LINK(SLOT)[w] = 0;
+    REG(EVENT) = HAL_ALL_EVENTS;
+}
+
+void hal_start(void)
+{
+    REG(EVENT_EN) = HAL_ALL_EVENTS;
+    hal_irq_unmask();
+    hal_irq_on();
+}
+
+uint32_t hal_take_events(void)
+{
+    const uint32_t events = REG(EVENT);
+    REG(EVENT) = events;
+    return events;
+}
+
+unsigned hal_batch_results(const asi_result_t **out)
+{
+    for (unsigned k = 0; k < batch_len; k++)
+        results[k] = result_of(LINK(BATCH)[k]);
+    *out = results;
+    return batch_len;
+}
+
+void hal_cycle_report(asi_cycle_report_t *report)
+{
+    for (unsigned attempt = 0; attempt < 2u; attempt++) { /* a cycle that ended while we read: read again, once */
+        const uint32_t cycle = LINK(CYCLES)[0];
+        for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++)
+            report->in[w] = LINK(IN_IMG)[w];
+        report->management = result_of(LINK(MGMT_RES)[0]);
+        report->inclusion = result_of(LINK(INCL_RES)[0]);
+        if (LINK(CYCLES)[0] == cycle)
+            break;
+    }
+}
+
+unsigned hal_next_lost(unsigned from)
+{
+    unsigned i = asi_list_next(&slots, from);
+    while (i < ASI_INDICES &&
+           (LINK(SLOT_STATE)[i] & SLOT_STATE_R__STREAK_bm) >> SLOT_STATE_R__STREAK_bp < ASI_FAIL_CYCLES)
+        i = asi_list_next(&slots, i + 1u);
+    return i;
+}
+
+bool hal_apf(void)
+{
+    return (REG(STATUS) & ASI_REGS__STATUS__APF_bm) != 0u;
+}
+
+uint32_t hal_time_us(void)
+{
+    return REG(TIME);
+}
+
+hal_counters_t hal_counters(void)
+{
+    return (hal_counters_t){.cycles = LINK(CYCLES)[0], .sent = LINK(SENT)[0], .repeated = LINK(REPEATED)[0],
+                            .failed = LINK(FAILED)[0]};
+}
+
+void hal_host_interrupt(void)
+{
+    REG(HOST_IRQ) = 1;
+}
+
+void hal_sleep(void)
+{
+    (void)REG(WAIT);
+}
+
+extern uint32_t _stack_guard[]; /* firmware.ld; startup.S writes the pattern */
+
+bool hal_stack_intact(void)
+{
+    return *(volatile uint32_t *)_stack_guard == 0x57AC6A4Du;
+}
+
+_Noreturn void hal_fatal(void)
+{
+    hal_irq_off();
+    REG(CTRL) = 0;
+    WINDOW(uint32_t, MAGIC)[0] = 0;
+    for (;;) {
+    }
+}

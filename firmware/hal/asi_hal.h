@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/**
+ * @file asi_hal.h  Registers, link RAM and interrupts for the application; the port of the core (asi_port.h) is in asi_hal.c.
+ * Context: everything but hal_init, hal_sleep and hal_fatal runs in the interrupt or with it masked.
+ */
+#ifndef ASI_HAL_H
+#define ASI_HAL_H
+#include <stdbool.h>
+#include <stdint.h>
+#include "asi_port.h"
+#include "asi_ec.h"
+
+/** Events, bits of EVENT. */
+enum {
+    HAL_CYCLE_DONE = 1u << 0,
+    HAL_BATCH_DONE = 1u << 1,
+    HAL_SLAVE_LOST = 1u << 2,
+    HAL_APF_CHANGE = 1u << 3,
+    HAL_TICK = 1u << 4,
+    HAL_HOST_ATTN = 1u << 5,
+    HAL_ALL_EVENTS = 0x3Fu,
+};
+
+typedef struct { uint32_t cycles, sent, repeated, failed; } hal_counters_t;
+
+/** Line quiet, link RAM cleared, no events; the interrupt stays masked. */
+void hal_init(void);
+/** Enable all events and unmask the interrupt. */
+void hal_start(void);
+/** Take what happened: the bits are cleared before this returns, so what is read afterwards is at least as new. */
+uint32_t hal_take_events(void);
+/** Results of the batch that ended, in order of the requests. @return their number */
+unsigned hal_batch_results(const asi_result_t **results);
+/** Results and inputs of the last cycle. */
+void hal_cycle_report(asi_cycle_report_t *report);
+/** Next active slave from index `from` that is no longer called, or 64. */
+unsigned hal_next_lost(unsigned from);
+/** Filtered power fail. */
+bool hal_apf(void);
+/** Bus time in us, wraps. */
+uint32_t hal_time_us(void);
+hal_counters_t hal_counters(void);
+/** Raise the host's interrupt. */
+void hal_host_interrupt(void);
+/** Sleep until an event is pending; with the interrupt open it has been served when this returns. */
+void hal_sleep(void);
+/** False when the stack has run over its guard. */
+bool hal_stack_intact(void);
+/** The program is broken: line off, window marked dead (MAGIC 0), for ever. */
+_Noreturn void hal_fatal(void);
+#endif

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whatever slaves, line, power and host do in whatever order: what must hold after every batch, cycle and tick."""
+from fake_line import DATA_EXCHANGE, OFFLINE, Master, Slave
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+
+nibbles = st.integers(0, 15)
+numbers = st.integers(1, 4)  # few numbers, so that pairs, clashes and re-use happen
+indices = st.sampled_from([0, 1, 2, 3, 31, 33, 34, 63])
+
+
+@st.composite
+def slaves(draw):
+    index = draw(indices)
+    extended = index > 32 or draw(st.booleans())
+    return Slave(index, io=draw(nibbles), id=0xA if extended else draw(st.sampled_from([0, 1, 0xB, 0xF])),
+                 id1=draw(nibbles), id2=draw(nibbles), inputs=draw(st.integers(1, 15)),
+                 old=not extended and draw(st.booleans()))  # EX-005: an A/B slave has RID1 and RID2
+
+
+class Line(RuleBasedStateMachine):
+    """EX-001, EX-008, EX-009, EX-015 .. EX-021, EX-023, EX-025, EX-026, CA-003, CA-006: invariants under any history."""
+
+    @initialize(first=st.lists(slaves(), max_size=4, unique_by=lambda s: s.index))
+    def power_up(self, first):
+        self.m = Master(first)
+        self.m.check = self.check
+        self.checked = 0
+        self.version, self.shown = None, None
+        self.m.settle()
+
+    def find(self, index):
+        return next((s for s in self.m.slaves if s.index == index), None)
+
+    @rule(s=slaves())
+    def appears(self, s):
+        if old := self.find(s.index):
+            self.m.slaves.remove(old)
+        self.m.slaves.append(s)
+
+    @rule(index=indices)
+    def vanishes(self, index):
+        if s := self.find(index):
+            self.m.slaves.remove(s)
+
+    @rule(index=indices, codes=st.tuples(nibbles, nibbles))
+    def changes_codes(self, index, codes):
+        if s := self.find(index):
+            s.io, s.id1 = codes
+
+    @rule(index=indices)
+    def resets(self, index):
+        if s := self.find(index):
+            s.power_up()
+
+    @rule(index=indices, calls=st.sets(st.sampled_from(["RDIO", "RDID", "RID1", "RID2", "WPAR", "DEXG"]), max_size=2))
+    def misbehaves(self, index, calls):
+        if s := self.find(index):
+            s.mute = frozenset(calls)
+
+    @rule(level=st.sampled_from([0.0, 0.05, 0.3]))
+    def noise(self, level):
+        self.m.noise = level
+
+    @rule(apf=st.booleans())
+    def power(self, apf):
+        self.m.power(apf)
+
+    @rule(on=st.booleans())
+    def protect(self, on):
+        self.m.protect(on)
+
+    @rule(on=st.booleans())
+    def offline(self, on):
+        self.m.set_offline(on)
+
+    @rule(on=st.booleans())
+    def data_exchange(self, on):
+        self.m.set_data_exchange(on)
+
+    @rule(on=st.booleans())
+    def auto_address(self, on):
+        self.m.set_auto_address(on)
+
+    @rule(some=st.lists(slaves().filter(lambda s: s.index), max_size=3, unique_by=lambda s: s.index), real=st.booleans())
+    def project(self, some, real):
+        self.m.project([s for s in self.m.slaves if s.index] if real else some)
+
+    @rule(outputs=st.lists(nibbles, min_size=64, max_size=64))
+    def outputs(self, outputs):
+        self.m.host_outputs = outputs
+
+    @rule(index=indices)
+    def management(self, index):
+        self.m.lib.fw_manage(0x400 | (index & 31) << 5 | 0x1E ^ (8 if index > 31 else 0))
+
+    @rule(steps=st.integers(1, 90), late=st.booleans())
+    def runs(self, steps, late):
+        for _ in range(steps):
+            if late:
+                self.m.cycle(report=False)
+            self.m.step()
+
+    @invariant()
+    def always(self):
+        if hasattr(self, "m"):
+            self.check()
+
+    def check(self):
+        m, s = self.m, self.m.read()
+        lps = {i for i in range(64) if m.projected[0][i >> 5] >> (i & 31) & 1}
+        assert m.port.violations == 0
+        assert s["las"] <= s["lds"] and 0 not in s["las"] and not s["lds"] & {32}
+        assert {i for i in range(64) if m.port.active[i]} == s["las"]
+        assert all(m.port.extended[i] == (i > 32 or s["cdi"][i] >> 4 & 15 == 0xA) for i in s["las"])
+        assert all(s["cdi"][i] == 0xFFFF for i in range(64) if i not in s["lds"])
+        assert all(s["in"][i] == 0 for i in range(64) if i not in s["las"])
+        assert s["flags"] == m.expected_flags(s), s
+        if m.protected:
+            assert all(i in lps and s["cdi"][i] == m.projected[1][i] for i in s["las"])
+        for i in s["las"]:  # EX-026
+            assert i < 33 or i - 32 not in s["lds"] or s["cdi"][i - 32] >> 4 & 15 == 0xA
+        if s["phase"] == OFFLINE:
+            assert not s["lds"] and list(m.port.out) == [0xFFFFFFFF] * 8 and not m.port.line
+        if m.apf or m.offline:
+            assert s["phase"] == OFFLINE
+        assert ("normal_operation_active" in s["flags"]) == bool(m.port.cycle) == (s["phase"] == DATA_EXCHANGE)
+        for i in range(64):  # idle addresses, and all with data exchange off: F
+            if i not in s["las"] or not m.data_exchange:
+                assert m.port.out[i >> 3] >> 4 * (i & 7) & 15 == 15
+        for call, _, _ in m.log[self.checked:]:
+            assert m.lib.fw_call_is_legal(call) and (call >= 0x400 or call >> 5), hex(call)
+        self.checked = len(m.log)
+        shown = {k: s[k] for k in ("phase", "flags", "lds", "las", "lpf", "cdi", "pi", "pecho")}
+        if self.shown is not None and shown != self.shown:  # what the window copies only on a new version
+            assert s["version"] != self.version
+            assert all(i in s["changed"] for i in range(64) for k in ("cdi", "pi", "pecho") if shown[k][i] != self.shown[k][i])
+            m.lib.fw_changes_taken()
+        self.shown, self.version = shown, s["version"]
+
+    def teardown(self):
+        """EX-012, EX-013, EX-014: left alone, the lists end up as the line is."""
+        if not hasattr(self, "m"):
+            return
+        m = self.m
+        m.noise = 0.0
+        for s in m.slaves:
+            s.mute, s.present = frozenset(), True
+        m.power(False)
+        m.set_offline(False)
+        m.protect(False)
+        standard = {s.index for s in m.slaves if s.index < 32 and not s.extended}
+        m.slaves = [s for s in m.slaves if s.index - 32 not in standard]
+        if m.slaves:
+            m.until(lambda s: s["phase"] == DATA_EXCHANGE)
+            for _ in range(5):
+                m.rounds()
+            s = m.read()
+            assert s["lds"] == {x.index for x in m.slaves} and s["las"] == s["lds"] - {0}
+            assert all(s["cdi"][x.index] == x.codes for x in m.slaves if x.index not in s["las"])
+
+
+TestLine = Line.TestCase
+TestLine.settings = settings(max_examples=60, stateful_step_count=30, deadline=None, derandomize=True,
+                             report_multiple_bugs=False, phases=[Phase.generate],
+                             suppress_health_check=list(HealthCheck))

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""asi.native.Chip seen as the runner wants it (asi.run.Bench): slaves, line power and host port of one chip."""
+from pathlib import Path
+from typing import Any
+
+from asi.plant import Faults, Slave
+
+
+class BenchError(Exception):
+    """The simulation cannot be started: a library is missing or refuses."""
+
+
+class NativeBench:
+    """One chip with its line."""
+
+    def __init__(self, chip: Any):
+        self.chip, self.net, self.clk_hz = chip, chip.net, chip.clk_hz
+
+    def time(self) -> int:
+        return self.chip.time_ns
+
+    def run(self, until_ns: int) -> int:
+        return self.chip.run(until_ns)
+
+    def host_read(self, addr: int) -> int:
+        return self.chip.host_read(addr)
+
+    def host_write(self, addr: int, data: int, be: int = 15) -> None:
+        self.chip.host_write(addr, data, be)
+
+    def telegrams(self) -> list[Any]:
+        return self.chip.log()
+
+    def stats(self) -> Any:
+        return self.chip.stats()
+
+    def add(self, slave: Slave) -> int:
+        codes = slave.codes
+        return self.net.add(address=slave.index, io=codes.io, id=codes.id, id1=codes.id1, id2=codes.id2,
+                            inputs=slave.inputs, watchdog=slave.watchdog, present=slave.present)
+
+    def set_inputs(self, slave: int, nibble: int) -> None:
+        self.net.set_inputs(slave, nibble)
+
+    def set_present(self, slave: int, present: bool) -> None:
+        self.net.set_present(slave, present)
+
+    def set_periphery_fault(self, slave: int, fault: bool) -> None:
+        self.net.set_periphery_fault(slave, fault)
+
+    def set_faults(self, slave: int, faults: Faults) -> None:
+        self.net.set_faults(slave, p_no_answer=faults.no_answer, p_parity=faults.parity,
+                            p_missing_pulse=faults.missing_pulse, p_shifted_pulse=faults.shifted_pulse,
+                            p_extra_pulse=faults.extra_pulse, shift_ns=faults.shift_ns, delay_ns=faults.delay_ns)
+
+    def power(self, good: bool) -> None:
+        self.net.power(good)
+
+    def apf(self, low: bool) -> None:
+        self.chip.apf(low)
+
+    def close(self) -> None:
+        self.chip.close()
+
+
+def open_bench(firmware: Path, waves: Path | None, seed: int) -> NativeBench:
+    """A chip in reset state at time 0; BenchError when the native libraries are not there or fail."""
+    from asi import native  # only here: plants and reports need no simulator
+    if not firmware.is_file():
+        raise BenchError(f"{firmware} is missing: make firmware")
+    try:
+        return NativeBench(native.Chip(firmware=firmware, waves=waves, seed=seed))
+    except (OSError, RuntimeError) as error:
+        raise BenchError(str(error)) from None
+
+
+def name_waves(path: Path) -> Path:
+    """Give a finished wave file the suffix of what is in it: .vcd or .fst (the build decides). -> the new path."""
+    with open(path, "rb") as file:
+        suffix = ".vcd" if file.read(1) == b"$" else ".fst"
+    return path.replace(path.with_suffix(suffix))

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Command line: `python -m asi run PLANT` and `python -m asi check PLANT ...`.
+
+Exit codes: 0 everything as the plant expects, 1 an expectation was not met, 2 bad input (plant, option),
+3 the simulation failed, 130 stopped by Ctrl-C (the report so far is written).
+"""
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from asi import report
+from asi.bench import BenchError, name_waves, open_bench
+from asi.plant import SETTLE_NS, Plant, PlantError, load_plant, parse_time
+from asi.run import Runner
+
+OK, NOT_MET, BAD_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+EXIT_CODES = {"ok": OK, "expectation not met": NOT_MET, "failed": FAILED, "interrupted": INTERRUPTED}
+
+FIRMWARE = Path("build/firmware")
+QUICK_SETTLE_NS = 20_000_000  # P_PWR_SETTLE of asi_test.hex
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
+                  help="Tools of the open AS-Interface master.")
+
+
+def _time(text: str) -> int:
+    try:
+        return parse_time(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+def _load(path: Path) -> Plant:
+    try:
+        return load_plant(path)
+    except PlantError as error:
+        for line in error.lines:
+            typer.echo(line, err=True)
+        raise typer.Exit(BAD_INPUT) from None
+
+
+def _fail(text: str, code: int) -> typer.Exit:
+    typer.echo(text, err=True)
+    return typer.Exit(code)
+
+
+class _Lines:
+    """Progress without a terminal: one line per tenth of the run."""
+
+    def __init__(self, console: Console):
+        self.console, self.tenth = console, 0
+
+    def __enter__(self) -> "_Lines":
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        pass
+
+    def __call__(self, now: int, end: int, cycle_max_ns: int) -> None:
+        tenth = min(10, 10 * now // max(end, 1))
+        if tenth > self.tenth:
+            self.tenth = tenth
+            self.console.print(f"{now / 1e6:.0f} of {end / 1e6:.0f} ms", highlight=False)
+
+
+class _Bar:
+    """Progress on a terminal: bus time, longest cycle so far, ratio to real time."""
+
+    def __init__(self, console: Console):
+        self.bar = Progress(TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"),
+                            TimeElapsedColumn(), console=console, transient=True)
+        self.task = self.bar.add_task("", total=1, note="")
+
+    def __enter__(self) -> "_Bar":
+        self.bar.__enter__()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.bar.__exit__(*exc)
+
+    def __call__(self, now: int, end: int, cycle_max_ns: int) -> None:
+        spent = self.bar.tasks[0].elapsed or 0.0
+        ratio = f"{now / 1e9 / spent:.2f} x real time" if spent > 0.1 else ""
+        cycle = f"longest cycle {report.us(cycle_max_ns)}" if cycle_max_ns else "no cycle yet"
+        self.bar.update(self.task, completed=now, total=end, description=f"{now / 1e6:.0f} of {end / 1e6:.0f} ms",
+                        note=f"{cycle}  {ratio}")
+
+
+@app.command()
+def run(
+    plant: Annotated[Path, typer.Argument(help="Plant file, e.g. sim/plants/packaging.toml.", show_default=False)],
+    time: Annotated[int | None, typer.Option(
+        "--time", "-t", parser=_time, metavar="TIME", show_default=False,
+        help="Bus time to run, e.g. 1200ms; default: the plant's duration.")] = None,
+    waves: Annotated[bool, typer.Option("--waves", help="Write a waveform (slow; see sim/views/asi.gtkw).")] = False,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for report, logs and waves.")] = Path("build/run"),
+    log: Annotated[bool, typer.Option(help="Write telegrams.log and telegrams.jsonl.")] = True,
+    seed: Annotated[int | None, typer.Option(
+        min=0, max=2**63 - 1, show_default=False, help="Random seed of the faults; default: the plant's.")] = None,
+    quick: Annotated[bool, typer.Option(
+        "--quick", help="Test firmware: waits 20 ms instead of 1 s after power-up; the plant's times move.")] = False,
+    firmware: Annotated[Path | None, typer.Option(
+        show_default=False, help="Another firmware image; say its settle time with --settle.")] = None,
+    settle: Annotated[int | None, typer.Option(
+        "--settle", parser=_time, metavar="TIME", show_default=False, help="Settle time of that image.")] = None,
+) -> None:
+    """Run a plant on the simulated master and report what happened."""
+    described = _load(plant)
+    settle_ns = settle if settle is not None else QUICK_SETTLE_NS if quick else SETTLE_NS
+    described = described.with_settle(settle_ns)
+    if seed is not None:
+        described = replace(described, seed=seed)
+    until_ns = described.duration_ns if time is None else time
+    if until_ns == 0:
+        raise _fail("--time: nothing to run", BAD_INPUT)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _fail(f"{out}: {error.strerror}", BAD_INPUT) from None
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console = Console(highlight=False, width=120)  # a file or a pipe has no width of its own
+    console.print(Text(" ".join(described.description.split()), style="dim"))
+    if until_ns <= settle_ns:
+        console.print(f"note: the line stays quiet until {report.us(settle_ns)}, the wait after power-up")
+    wave_path = out / "waves.part" if waves else None
+    image = firmware or FIRMWARE / ("asi_test.hex" if quick else "asi.hex")
+    files = ["report.json", *(["telegrams.log", "telegrams.jsonl"] if log else [])]
+    try:
+        bench = open_bench(image, wave_path, described.seed)
+    except BenchError as error:
+        raise _fail(f"simulation: {error}", FAILED) from None
+    try:
+        with (_Bar if console.is_terminal else _Lines)(console) as progress:
+            result = Runner(described, bench, out, until_ns, log=log, progress=progress).run()
+        bench.close()
+        if wave_path is not None:
+            files.append(name_waves(wave_path).name)
+    except OSError as error:
+        raise _fail(f"{out}: {error.strerror}", FAILED) from None
+    report.show(result, console)
+    console.print(Text(f"written: {', '.join(str(out / name) for name in files)}", style="dim"), soft_wrap=True)
+    for check in result["checks"]:
+        for difference in check["differences"]:
+            typer.echo(f"not met: {check['name']} at {report.us(check['at_ns'])}: {difference}", err=True)
+    if result["error"]:
+        typer.echo(f"simulation: {result['error']}", err=True)
+    raise typer.Exit(EXIT_CODES[result["result"]])
+
+
+@app.command()
+def check(
+    plants: Annotated[list[Path], typer.Argument(help="Plant files.", show_default=False)],
+) -> None:
+    """Check plant files without running them."""
+    for path in plants:
+        described = _load(path)
+        typer.echo(f"{path}: {described.name}: {len(described.slaves)} slaves, {len(described.host.pcd)} projected, "
+                   f"{report.us(described.duration_ns)}")
+
+
+def main() -> None:
+    app(prog_name="asi")

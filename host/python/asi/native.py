@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Native simulation from Python: simulated slaves (Net) and the Verilated chip with them (Chip).
+
+Binding of tb/asi_tb.h (cffi, ABI mode: no compiler at run time). Times are in ns of bus time since reset; slaves
+are handles in the order of add(). Every refused call raises NativeError.
+"""
+import re
+import struct
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from cffi import FFI
+
+_ROOT = Path(__file__).resolve().parents[3]
+_BULK = 4096  # records fetched per call
+CERTAIN = 0xFFFF  # probability of a fault: always
+
+
+class NativeError(RuntimeError):
+    """The native side refused a call, or its library is not there."""
+
+
+class Pulse(NamedTuple):
+    t_ns: int
+    width_ns: int
+    polarity: int  # -1, +1
+
+
+class Telegram(NamedTuple):
+    """One call on the line as the passive monitor saw it."""
+    t_ns: int         # first pulse of the request
+    delay_ns: int     # last request pulse to first answer pulse, -1 without answer
+    call: int         # CB A4..A0 I4..I0
+    error_class: int  # asi.regmap.ErrorClass of the answer
+    data: int         # answer nibble, valid when error_class is OK
+    phase: int        # asi.regmap.Phase when the request began
+    repeated: int     # 1: immediate repetition of the call before
+    request_ok: int   # 0: the request itself was not a legal telegram
+
+
+class SlaveState(NamedTuple):
+    address: int      # index: number + 32 * Sel
+    outputs: int
+    parameter: int
+    dexg_disabled: bool
+    synchronous: bool
+    present: bool
+    status: int       # S3..S0
+    requests: int
+    answers: int
+
+
+class Stats(NamedTuple):
+    clocks: int
+    telegrams: int
+    repeated: int
+    failed: int             # answers that were not OK
+    phase_ns: tuple         # bus time per phase_o
+    cycles: int
+    cycle_periods: int
+    cycle_min_ns: int
+    cycle_max_ns: int
+    cycle_sum_ns: int
+    irq_count: int
+    irq_clocks_max: int
+
+    @property
+    def cycle_mean_ns(self):
+        return self.cycle_sum_ns / self.cycle_periods if self.cycle_periods else 0.0
+
+
+_PULSE = struct.Struct("=qii")
+_TELEGRAM = struct.Struct("=qiHBBBBBx4x")
+
+
+def declarations():
+    """The C declarations between the cffi markers of tb/asi_tb.h."""
+    text = (_ROOT / "tb/asi_tb.h").read_text()
+    return re.search(r"/\* cffi begin \*/(.*)/\* cffi end \*/", text, re.S).group(1)
+
+
+@cache
+def load(name, directory=_ROOT / "build/tb"):
+    """-> (ffi, lib) of lib<name>.so: 'asi_slaves', 'asi_chip' or 'asi_chip_trace'."""
+    path = Path(directory) / f"lib{name}.so"
+    if not path.exists():
+        raise NativeError(f"{path} is missing: make build/tb/{path.name}")
+    ffi = FFI()
+    ffi.cdef(declarations())
+    assert ffi.sizeof("asi_telegram") == _TELEGRAM.size and ffi.sizeof("asi_pulse") == _PULSE.size
+    return ffi, ffi.dlopen(str(path))
+
+
+def _check(result, what):
+    if result < 0:
+        raise NativeError(f"{what}: refused")
+    return result
+
+
+def _drain(ffi, function, handle):
+    """All waiting telegrams of `function` (asi_net_log or asi_chip_log)."""
+    out = []
+    buffer = ffi.new("asi_telegram[]", _BULK)
+    while count := _check(function(handle, buffer, _BULK), "log"):
+        out += map(Telegram._make, _TELEGRAM.iter_unpack(ffi.buffer(buffer, count * _TELEGRAM.size)))
+    return out
+
+
+class Net:
+    """Slaves on one line. Alone: feed it master pulses; on a chip: Chip.net."""
+
+    def __init__(self, seed=0, *, _chip=None):
+        if _chip:
+            self._ffi, self._lib, self._chip = _chip._ffi, _chip._lib, _chip  # keeps the chip alive
+            self._net = self._lib.asi_chip_net(_chip._chip)
+        else:
+            self._ffi, self._lib = load("asi_slaves")
+            self._net = self._ffi.gc(self._lib.asi_net_new(seed), self._lib.asi_net_free)
+
+    def add(self, address, io=0, id=0xF, id1=0xF, id2=0xF, inputs=0, watchdog=False, present=True):
+        """-> slave handle. address: index 0, 1..31, 33..63 (B: only with id = 0xA)."""
+        cfg = self._ffi.new("asi_slave_cfg *", dict(
+            address=address, io=io, id=id, id1=id1, id2=id2, inputs=inputs, watchdog=watchdog, present=present))
+        return _check(self._lib.asi_net_add(self._net, cfg), f"slave at index {address}")
+
+    def set_inputs(self, slave, inputs):
+        """inputs: nibble, line level."""
+        _check(self._lib.asi_net_set_inputs(self._net, slave, inputs), f"inputs {inputs} of slave {slave}")
+
+    def set_present(self, slave, present):
+        """Connect (power-up reset) or disconnect a slave."""
+        _check(self._lib.asi_net_set_present(self._net, slave, present), f"slave {slave}")
+
+    def set_periphery_fault(self, slave, fault):
+        _check(self._lib.asi_net_set_periphery_fault(self._net, slave, fault), f"slave {slave}")
+
+    def set_faults(self, slave, **faults):
+        """p_no_answer, p_parity, p_missing_pulse, p_shifted_pulse, p_extra_pulse (1/65536 per answer, CERTAIN: always),
+        shift_ns, delay_ns; what is not named is off."""
+        _check(self._lib.asi_net_set_faults(self._net, slave, self._ffi.new("asi_slave_faults *", faults)),
+               f"slave {slave}")
+
+    def state(self, slave):
+        """-> SlaveState now."""
+        s = self._ffi.new("asi_slave_state *")
+        _check(self._lib.asi_net_get(self._net, slave, s), f"slave {slave}")
+        return SlaveState(s.address, s.outputs, s.parameter, bool(s.dexg_disabled), bool(s.synchronous),
+                          bool(s.present), s.status, s.requests, s.answers)
+
+    def power(self, good):
+        """False: all slaves lose power."""
+        _check(self._lib.asi_net_power(self._net, good), "power")
+
+    def inject(self, t_ns, polarity, width_ns=1_500):
+        """A pulse of a foreign sender, heard by master and monitor."""
+        _check(self._lib.asi_net_inject(self._net, t_ns, polarity, width_ns), f"pulse at {t_ns} ns")
+
+    def master_pulse(self, t_ns, polarity):
+        """Only without a chip; time never goes back."""
+        _check(self._lib.asi_net_master_pulse(self._net, t_ns, polarity), f"master pulse at {t_ns} ns")
+
+    def advance(self, t_ns):
+        """Only without a chip. -> [Pulse] that the slaves began until t_ns."""
+        out, buffer = [], self._ffi.new("asi_pulse[64]")
+        while True:
+            count = _check(self._lib.asi_net_advance(self._net, t_ns, buffer, 64), f"advance to {t_ns} ns")
+            out += map(Pulse._make, _PULSE.iter_unpack(self._ffi.buffer(buffer, count * _PULSE.size)))
+            if count < 64:
+                return out
+
+    def log(self):
+        """-> [Telegram], drained."""
+        return _drain(self._ffi, self._lib.asi_net_log, self._net)
+
+
+class Chip:
+    """Verilated asi_master with a Net on its pins.
+
+    firmware: RAM image (hex words); waves: wave file to write, uses the slower traced library.
+    """
+
+    def __init__(self, firmware=None, waves=None, seed=0):
+        self._ffi, self._lib = load("asi_chip_trace" if waves else "asi_chip")
+        path = [self._ffi.NULL if p is None else self._ffi.new("char[]", str(Path(p).resolve()).encode())
+                for p in (firmware, waves)]
+        chip = self._lib.asi_chip_new(*path, seed)
+        if chip == self._ffi.NULL:
+            raise NativeError(f"chip: cannot open firmware {firmware} or waves {waves}")
+        self._chip = self._ffi.gc(chip, self._lib.asi_chip_free)
+        self.net = Net(_chip=self)
+        self.clk_hz = self._lib.asi_chip_clk_hz(self._chip)
+
+    def close(self):
+        """Ends the simulation and completes the wave file. Nothing may be called after it."""
+        self.net = None
+        if self._chip is not None:
+            self._ffi.release(self._chip)
+            self._chip = None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    @property
+    def time_ns(self):
+        return self._lib.asi_chip_time(self._chip)
+
+    def run(self, until_ns):
+        """-> time reached, ns."""
+        return self._lib.asi_chip_run(self._chip, until_ns)
+
+    def run_irq(self, until_ns):
+        """As run, but stops when host_irq_o is high. -> time reached, ns."""
+        return self._lib.asi_chip_run_irq(self._chip, until_ns)
+
+    def host_read(self, byte_addr):
+        """A read on the host port; takes bus time."""
+        return self._lib.asi_chip_host_read(self._chip, byte_addr)
+
+    def host_write(self, byte_addr, data, byte_enable=0xF):
+        """A write on the host port; takes bus time."""
+        self._lib.asi_chip_host_write(self._chip, byte_addr, data, byte_enable)
+
+    def apf(self, low):
+        """Pin apf_ni: True = line voltage too low. The slaves follow net.power()."""
+        self._lib.asi_chip_apf(self._chip, low)
+
+    def log(self):
+        """-> [Telegram], drained."""
+        return _drain(self._ffi, self._lib.asi_chip_log, self._chip)
+
+    def stats(self):
+        """-> Stats since reset."""
+        s = self._ffi.new("asi_chip_stats *")
+        self._lib.asi_chip_get_stats(self._chip, s)
+        return Stats(s.clocks, s.telegrams, s.repeated, s.failed, tuple(s.phase_ns), s.cycles, s.cycle_periods,
+                     s.cycle_min_ns, s.cycle_max_ns, s.cycle_sum_ns, s.irq_count, s.irq_clocks_max)

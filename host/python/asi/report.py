@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a run: one plain dict (docs/report.md), written as JSON and shown on the terminal from that dict."""
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console, Group
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from asi.plant import Check, line_order
+from asi.regmap import Phase
+from asi.telegram_log import Counts, Tally
+from asi.window import INDICES, WindowError
+
+if TYPE_CHECKING:
+    from asi.run import Runner
+
+SCHEMA = "asi-report 1"
+LISTS = ("lds", "las", "lps", "lpf")
+
+
+def check_result(check: Check, differences: list[str] | None, final: bool) -> dict[str, Any]:
+    """One entry of report["checks"]; differences None: the run did not get there."""
+    result = "not reached" if differences is None else "not met" if differences else "met"
+    return {"name": "expect" if final else "check", "at_ns": check.time_ns, "result": result,
+            "differences": differences or []}
+
+
+def build(runner: "Runner", counts: Counts, *, wall_s: float, interrupted: bool, error: str | None) -> dict[str, Any]:
+    """Read the chip once more and put everything together."""
+    plant, bench, window = runner.plant, runner.bench, runner.window
+    bus_ns = bench.time()  # before the reads below, which take bus time themselves
+    state, outputs, detected = window.state(), window.outputs(), window.detected_codes()
+    try:
+        inputs = window.inputs()
+    except WindowError as fault:
+        inputs, error = None, error or str(fault)
+    stats, checks = bench.stats(), runner.results()
+    failed = any(check["result"] == "not met" for check in checks)
+    result = ("failed" if error else "interrupted" if interrupted else "expectation not met" if failed else "ok")
+    lists = {name: sorted(getattr(state, name), key=line_order) for name in LISTS}
+    timed = stats.cycle_periods > 0
+    return {
+        "schema": SCHEMA,
+        "result": result,
+        "error": error,
+        "plant": {"file": plant.path, "name": plant.name, "description": plant.description, "seed": plant.seed},
+        "run": {
+            "bus_time_ns": bus_ns, "wanted_ns": runner.until_ns, "clk_hz": bench.clk_hz, "clocks": stats.clocks,
+            "wall_s": round(wall_s, 3), "real_time_ratio": round(bus_ns / 1e9 / wall_s, 4) if wall_s > 0 else None,
+            "firmware": runner.version,
+        },
+        "state": {
+            "phase": state.phase.name, "flags": state.flags,
+            **{name: [plant.name_of(index) for index in indices] for name, indices in lists.items()},
+        },
+        "slaves": _slaves(plant, state, inputs, outputs, detected, counts),
+        "cycles": {
+            "count": stats.cycles, "min_ns": stats.cycle_min_ns if timed else None,
+            "mean_ns": stats.cycle_sum_ns // stats.cycle_periods if timed else None,
+            "max_ns": stats.cycle_max_ns if timed else None,
+        },
+        "telegrams": {
+            **_tally(counts.total), "bad_requests": counts.broken_requests,
+            "by_call": dict(sorted(counts.by_call.items())), "by_class": dict(sorted(counts.by_class.items())),
+        },
+        "master": {name: state.counters[name] for name in ("sent", "repeated", "failed", "cycles")},
+        "core": {"interrupts": stats.irq_count, "longest_busy_clocks": stats.irq_clocks_max},
+        "start": {
+            "first_telegram_ns": counts.first_ns, "first_cycle_ns": counts.first_cycle_ns,
+            "start_up_ns": counts.first_cycle_ns - counts.first_ns if counts.first_cycle_ns is not None else None,
+        },
+        "phases_ns": {phase.name: stats.phase_ns[phase] for phase in Phase},
+        "checks": checks,
+    }
+
+
+def _tally(tally: Tally) -> dict[str, int]:
+    return {"requests": tally.requests, "repeated": tally.repeated, "failed": tally.failed}
+
+
+def _slaves(plant, state, inputs, outputs, detected, counts) -> list[dict[str, Any]]:
+    """One row per address that the plant, the projection or the master knows."""
+    known = {slave.index: slave for slave in reversed(plant.slaves)}
+    rows = []
+    for index in sorted({*known, *plant.host.pcd, *state.lds, *state.las, *state.lps}, key=line_order):
+        slave, projected = known.get(index), plant.host.pcd.get(index)
+        codes = slave.codes if slave else projected
+        rows.append({
+            "address": plant.name_of(index), "index": index,
+            "name": " / ".join(s.name for s in plant.slaves if s.index == index) or plant.host.names.get(index),
+            "profile": codes.profile if codes else None,
+            "detected": detected[index].profile if index in detected else None,
+            **{name: index in getattr(state, name) for name in LISTS},
+            "inputs": None if inputs is None or not index else f"{inputs[index]:04b}",
+            "outputs": None if not index else f"{outputs[index]:04b}",
+            **_tally(counts.by_index.get(index, Tally())),
+        })
+    rest = Tally()
+    for index in INDICES:
+        if index in counts.by_index and all(row["index"] != index for row in rows):
+            tally = counts.by_index[index]
+            rest.requests += tally.requests
+            rest.repeated += tally.repeated
+            rest.failed += tally.failed
+    rows.append({"address": None, "index": None, "name": None, "profile": None, "detected": None,
+                 **{name: False for name in LISTS}, "inputs": None, "outputs": None, **_tally(rest)})
+    return rows
+
+
+def write(report: dict[str, Any], path: Path) -> None:
+    path.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+
+
+# ---------------------------------------------------------------- the terminal
+def us(time_ns: int | None) -> str:
+    """4928000 -> '4928.000 us'; milliseconds from 10 ms on."""
+    if time_ns is None:
+        return "-"
+    return f"{time_ns / 1e3:.3f} us" if time_ns < 10_000_000 else f"{time_ns / 1e6:.3f} ms"
+
+
+def _ranges(addresses: list[str]) -> str:
+    """['1', '2', '3', '5A'] -> '1-3 5A'; only plain runs of the same kind are joined."""
+    out: list[list[str]] = []
+    for address in addresses:
+        last = out[-1][-1] if out else ""
+        if last and address.strip("AB").isdecimal() and address[-1:].isalpha() == last[-1:].isalpha() \
+                and (not address[-1:].isalpha() or address[-1] == last[-1]) \
+                and int(address.strip("AB")) == int(last.strip("AB")) + 1:
+            out[-1].append(address)
+        else:
+            out.append([address])
+    return " ".join(" ".join(run) if len(run) < 3 else f"{run[0]}-{run[-1]}" for run in out) or "none"
+
+
+def _list_text(addresses: list[str]) -> str:
+    """A network of A/B pairs reads better as two runs."""
+    groups = [[a for a in addresses if not a.endswith(("A", "B"))], [a for a in addresses if a.endswith("A")],
+              [a for a in addresses if a.endswith("B")]]
+    return " ".join(_ranges(group) for group in groups if group) or "none"
+
+
+def _pairs(rows: list[tuple[str, Any]]) -> Table:
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="dim")
+    table.add_column()
+    for name, value in rows:
+        table.add_row(name, value if isinstance(value, Text) else Text(str(value)))
+    return table
+
+
+def _flags(flags: dict[str, bool]) -> Text:
+    good = {"config_ok": True, "periphery_ok": True, "normal_operation_active": True, "apf": False, "lds0": False}
+    text = Text()
+    for name, on in flags.items():
+        bad = name in good and good[name] != on
+        text.append(f"{name}={int(on)}", style="bold red" if bad else "bold green" if on else "dim")
+        text.append("  ")
+    return text
+
+
+def _slave_table(rows: list[dict[str, Any]]) -> Table:
+    table = Table(box=None, header_style="bold", padding=(0, 1))
+    for name, justify in (("addr", "right"), ("name", "left"), ("profile", "left"), ("lists", "left"),
+                          ("in", "left"), ("out", "left"), ("requests", "right"), ("failed", "right"),
+                          ("repeated", "right")):
+        table.add_column(name, justify=justify, no_wrap=name != "name")
+    for row in rows:
+        if row["address"] is None and not row["requests"]:
+            continue
+        profile = row["profile"] or row["detected"] or ""
+        if row["detected"] and row["detected"] != profile:
+            profile += f" (is {row['detected']})"
+        lists = " ".join(name.upper() for name in LISTS if row[name])
+        bad = row["lps"] != row["las"] or (row["index"] == 0 and row["lds"])
+        name = row["name"] or ("-" if row["address"] else "addresses without a slave")
+        table.add_row(row["address"] or "other", Text(name), profile, Text(lists, style="yellow" if bad else "green"),
+                      row["inputs"] or "", row["outputs"] or "",
+                      *(str(row[key]) for key in ("requests", "failed", "repeated")))
+    return table
+
+
+def _checks(checks: list[dict[str, Any]]) -> Text:
+    text = Text()
+    styles = {"met": "green", "not met": "bold red", "not reached": "yellow"}
+    for number, check in enumerate(checks):
+        text.append(f"{chr(10) if number else ''}{check['name']} at {us(check['at_ns'])}: ")
+        text.append(check["result"], style=styles[check["result"]])
+        for difference in check["differences"]:
+            text.append(f"\n  {difference}")
+    return text
+
+
+def render(report: dict[str, Any]) -> Group:
+    """The report for a person; uses nothing but the dict."""
+    run, state, cycles, telegrams = report["run"], report["state"], report["cycles"], report["telegrams"]
+    style = {"ok": "green", "interrupted": "yellow"}.get(report["result"], "red")
+    ratio = "-" if run["real_time_ratio"] is None else f"{run['real_time_ratio']:.2f} x real time"
+    title = Text.assemble((report["plant"]["name"], "bold"), "  ", (report["result"].upper(), f"bold {style}"))
+    head = _pairs([
+        ("bus time", f"{us(run['bus_time_ns'])} in {run['wall_s']:.1f} s ({ratio}), "
+                     f"{run['clocks']} clocks at {run['clk_hz'] / 1e6:g} MHz"),
+        ("firmware", run["firmware"] or "not started"),
+        ("phase", state["phase"]),
+        ("flags", _flags(state["flags"])),
+        *[(name.upper(), f"{len(state[name])}: {_list_text(state[name])}" if state[name] else "none")
+          for name in LISTS],
+    ])
+    phases = ", ".join(f"{name} {us(time)}" for name, time in report["phases_ns"].items() if time)
+    start = report["start"]
+    foot = _pairs([
+        ("cycle", f"min {us(cycles['min_ns'])}, mean {us(cycles['mean_ns'])}, max {us(cycles['max_ns'])}; "
+                  f"{cycles['count']} cycles"),
+        ("telegrams", f"{telegrams['requests']} requests, {telegrams['repeated']} repeated, "
+                      f"{telegrams['failed']} without a valid answer, {telegrams['bad_requests']} bad requests"),
+        ("calls", ", ".join(f"{name} {count}" for name, count in telegrams["by_call"].items()) or "none"),
+        ("answers", ", ".join(f"{name} {count}" for name, count in telegrams["by_class"].items()) or "none"),
+        ("master counts", ", ".join(f"{name} {count}" for name, count in report["master"].items())),
+        ("core", f"{report['core']['interrupts']} interrupts, longest {report['core']['longest_busy_clocks']} clocks"),
+        ("start-up", f"first telegram at {us(start['first_telegram_ns'])}, first cycle at "
+                     f"{us(start['first_cycle_ns'])}, {us(start['start_up_ns'])} from one to the other"),
+        ("phases", phases or "none"),
+        ("expected", _checks(report["checks"])),
+    ])
+    parts: list[Any] = [Panel(head, title=title, title_align="left", border_style=style),
+                        _slave_table(report["slaves"]), Text(""), foot]
+    if report["error"]:
+        parts.append(Text(f"error: {report['error']}", style="bold red"))
+    return Group(*parts)
+
+
+def show(report: dict[str, Any], console: Console) -> None:
+    console.print(render(report))

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Run a plant on a simulated chip: play the world and the host, watch the line, write logs, make the report.
+
+Nothing grows with the length of a run: telegrams go to files in pieces, actions come from an iterator.
+Times are ns of bus time since reset.
+"""
+import time
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from asi import report
+from asi.plant import Action, Check, Faults, Plant, Slave, line_order
+from asi.telegram import index_name
+from asi.telegram_log import TelegramLog
+from asi.window import HostWindow, State, WindowError
+
+CHUNK_NS = 10_000_000        # longest step: Ctrl-C and the progress display react after at most this
+POLL_NS = 500_000            # step while the firmware starts or a commit is open
+START_LIMIT_NS = 100_000_000  # firmware must be up by then
+COMMIT_LIMIT_NS = 100_000_000  # ... and a commit applied within this
+
+
+class SimulationError(Exception):
+    """The chip does not do what every run needs: it does not start, refuses the projection, never gets consistent."""
+
+
+class Bench(Protocol):
+    """The simulated world as the runner needs it; asi.native.Chip seen through asi.bench.NativeBench."""
+    clk_hz: int
+
+    def time(self) -> int: ...
+    def run(self, until_ns: int) -> int: ...
+    def host_read(self, addr: int) -> int: ...
+    def host_write(self, addr: int, data: int, be: int = 15) -> None: ...
+    def telegrams(self) -> list[Any]: ...
+    def stats(self) -> Any: ...
+    def add(self, slave: Slave) -> int: ...
+    def set_inputs(self, slave: int, nibble: int) -> None: ...
+    def set_present(self, slave: int, present: bool) -> None: ...
+    def set_periphery_fault(self, slave: int, fault: bool) -> None: ...
+    def set_faults(self, slave: int, faults: Faults) -> None: ...
+    def power(self, good: bool) -> None: ...
+    def apf(self, low: bool) -> None: ...
+    def close(self) -> None: ...
+
+
+def compare(check: Check, state: State, inputs: list[int] | None, cycle_max_ns: int | None,
+            name_of: Callable[[int], str] = index_name) -> list[str]:
+    """-> one line per difference between what a check wants and what is there; empty: met."""
+    out = []
+    for name in ("lds", "las", "lps"):
+        want, have = getattr(check, name), getattr(state, name)
+        if want is not None and want != have:
+            for word, indices in (("missing", want - have), ("too many", have - want)):
+                if indices:
+                    out.append(f"{name.upper()} {word}: {' '.join(map(name_of, sorted(indices, key=line_order)))}")
+    for name, want in check.flags.items():
+        if state.flags[name] != want:
+            out.append(f"{name} is {int(not want)}, expected {int(want)}")
+    for index, want in check.inputs.items():
+        have = inputs[index] if inputs is not None else None
+        if have != want:
+            shown = "unreadable" if have is None else f"{have:04b}"
+            out.append(f"input {name_of(index)} is {shown}, expected {want:04b}")
+    if check.cycle_max_ns is not None:
+        if not cycle_max_ns:
+            out.append("no cycle was measured")
+        elif cycle_max_ns > check.cycle_max_ns:
+            out.append(f"longest cycle {report.us(cycle_max_ns)}, expected at most {report.us(check.cycle_max_ns)}")
+    return out
+
+
+class Runner:
+    """One run. `progress` is called after each step with (bus time, end, longest cycle so far in ns)."""
+
+    def __init__(self, plant: Plant, bench: Bench, folder: Path, until_ns: int | None = None, *, log: bool = True,
+                 progress: Callable[[int, int, int], None] | None = None):
+        self.plant, self.bench, self.folder = plant, bench, folder
+        self.until_ns = plant.duration_ns if until_ns is None else until_ns
+        self.progress = progress or (lambda now, end, cycle: None)
+        self.window = HostWindow(bench)
+        self.configured = False
+        self.version: str | None = None
+        self._log_wanted = log
+        self._pending: tuple[int, int] | None = None  # open commit: sequence, time of the write
+        self._host_queue: deque[Action] = deque()
+        self._checks = deque(plant.checks)
+        self._results: list[dict[str, Any]] = []
+        self._handles: list[int] = []
+
+    def run(self) -> dict[str, Any]:
+        """Run to the end, Ctrl-C or a failure; -> the report (docs/report.md), also written to report.json."""
+        started = time.monotonic()
+        interrupted, error = False, None
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with TelegramLog(self.folder if self._log_wanted else None, self.plant.extended) as log:
+            try:
+                self._loop(log)
+            except KeyboardInterrupt:
+                interrupted = True
+            except (SimulationError, WindowError) as fault:
+                error = str(fault)
+            log.add(self.bench.telegrams())
+            wall_s = time.monotonic() - started
+            out = report.build(self, log.counts, wall_s=wall_s, interrupted=interrupted, error=error)
+        report.write(out, self.folder / "report.json")
+        return out
+
+    def results(self) -> list[dict[str, Any]]:
+        """Checks so far, those not reached included."""
+        return self._results + [report.check_result(check, None, check is self.plant.checks[-1])
+                                for check in self._checks]
+
+    # ------------------------------------------------------------ the loop
+    def _loop(self, log: TelegramLog) -> None:
+        for slave in self.plant.slaves:
+            self._handles.append(self.bench.add(slave))
+        actions = self.plant.iter_actions()
+        action = next(actions, None)
+        now = self.bench.time()
+        while True:
+            while action is not None and action.time_ns <= now:
+                self._act(action)
+                action = next(actions, None)
+            self._host()
+            if now >= self.until_ns:
+                break
+            waiting = not self.configured or self._pending is not None
+            stop = min(now + (POLL_NS if waiting else CHUNK_NS), self.until_ns,
+                       *[a.time_ns for a in (action, self._checks[0] if self._checks else None) if a is not None])
+            now = self.bench.run(max(stop, now + 1))
+            log.add(self.bench.telegrams())
+            while self._checks and self._checks[0].time_ns <= now:  # before what happens at the same time
+                self._check(self._checks.popleft())
+            self.progress(now, self.until_ns, self.bench.stats().cycle_max_ns)
+
+    def _check(self, check: Check) -> None:
+        state = self.window.state()
+        inputs = self.window.inputs() if check.inputs else None
+        differences = compare(check, state, inputs, self.bench.stats().cycle_max_ns,
+                              self.plant.name_of)
+        self._results.append(report.check_result(check, differences, check is self.plant.checks[-1]))
+
+    # ------------------------------------------------------------ the world
+    def _act(self, action: Action) -> None:
+        bench = self.bench
+        handles = [self._handles[position] for position in action.slaves]
+        if action.do in ("output", "mode", "offline", "data_exchange", "auto_address"):
+            self._host_queue.append(action)
+        elif action.do == "power_off":
+            bench.power(False)
+            bench.apf(True)
+        elif action.do == "power_on":
+            bench.power(True)
+            bench.apf(False)
+        elif action.do in ("apf_low", "apf_high"):
+            bench.apf(action.do == "apf_low")
+        else:
+            work = {
+                "inputs": lambda h: bench.set_inputs(h, action.value),
+                "drop": lambda h: bench.set_present(h, False),
+                "connect": lambda h: bench.set_present(h, True),
+                "noise": lambda h: bench.set_faults(h, action.value),
+                "quiet": lambda h: bench.set_faults(h, Faults()),
+                "periphery_fault": lambda h: bench.set_periphery_fault(h, True),
+                "periphery_ok": lambda h: bench.set_periphery_fault(h, False),
+            }[action.do]
+            for handle in handles:
+                work(handle)
+
+    # ------------------------------------------------------------ the host
+    def _host(self) -> None:
+        """Start-up, open commits, then what waits in the queue; one commit at a time."""
+        now = self.bench.time()
+        if not self.configured:
+            if self.window.ready():
+                self.configured = True
+                self.version = self.window.version()
+                self._pending = (self.window.configure(self.plant.host), now)
+            elif now > START_LIMIT_NS:
+                raise SimulationError(f"the firmware did not start within {START_LIMIT_NS // 10**6} ms (MAGIC)")
+            return
+        if self._pending is not None:
+            sequence, since = self._pending
+            result = self.window.result(sequence)
+            if result is None:
+                if now - since > COMMIT_LIMIT_NS:
+                    raise SimulationError(f"commit {sequence} was not applied within {COMMIT_LIMIT_NS // 10**6} ms")
+                return
+            if result != 0:
+                raise SimulationError(f"commit {sequence} was refused: FW_RESULT = {result}")
+            self._pending = None
+        while self._host_queue and self._pending is None:
+            action = self._host_queue.popleft()
+            if action.do == "output":
+                self.window.set_output(*action.value)
+            else:
+                name = {"mode": "protected_mode", "auto_address": "auto_address_enable"}.get(action.do, action.do)
+                self._pending = (self.window.set_control(**{name: action.value}), now)

