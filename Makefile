@@ -46,6 +46,8 @@ lint: $(VENV)/.ready  ## Verilator -Wall over the whole chip, three parameter se
 	@for set in $(LINT_SETS); do echo "lint asi_master $$set"; \
 	  verilator --lint-only --quiet-stats -Wall $(CURDIR)/tools/lint.vlt --top-module asi_master $$set \
 	    -F $(CURDIR)/rtl/asi_master.f $(VEXRISCV) || exit 1; done
+	@echo "lint syn/top.sv"; verilator --lint-only --quiet-stats -Wall $(CURDIR)/tools/lint.vlt --top-module top \
+	  -F $(CURDIR)/rtl/asi_master.f $(VEXRISCV) $(CURDIR)/syn/serial_host.sv $(CURDIR)/syn/top.sv
 
 .PHONY: synth
 synth: $(VENV)/.synth  ## cells and clock rate on iCE40 UP5K and ECP5-25F (minutes), table and build/synth/numbers.json

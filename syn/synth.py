@@ -111,7 +111,7 @@ def main():
     vexriscv = f"{args.out}/VexRiscv_Min.v"          # the tools see only files below the present folder
     shutil.copy(args.vexriscv, vexriscv)
     boot_rom = args.boot_rom
-    if not Path(boot_rom).exists():
+    if not Path(boot_rom).exists() and any(PARTS[key]["boot_rom"] for key in args.part or PARTS):
         boot_rom = f"{args.out}/filler.hex"          # an empty ROM would be optimised away
         rng = random.Random(1)
         Path(boot_rom).write_text("".join(f"{rng.getrandbits(32):08x}\n" for _ in range(256)))

@@ -18,9 +18,10 @@ module top #(
   output logic       sync_o, core_wait_o,
   output logic [2:0] phase_o
 );
-  logic [7:0] por_q = '0;                     // FPGA flip-flops start at 0
+  logic [7:0] por_q;
   logic [1:0] rst_sync_q;
   logic       rst;
+  initial por_q = '0;                         // FPGA flip-flops start at 0
   always_ff @(posedge clk_i) begin
     rst_sync_q <= {rst_sync_q[0], rst_ni};
     if (!rst_sync_q[1])  por_q <= '0;

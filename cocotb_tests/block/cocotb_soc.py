@@ -15,8 +15,6 @@ MAIL = 0x3F00 // 4                                                 # mailbox of 
 OP, ADDR, DATA, RESULT, IRQS, EVENTS, ALIVE = range(MAIL, MAIL + 7)
 READ, WRITE, CALL, IRQ_ON, IRQ_OFF = {1: 1, 2: 2, 4: 3}, {1: 4, 2: 5, 4: 6}, 7, 8, 9
 EVENT_BIT = {"cycle_done": 0, "batch_done": 1, "slave_lost": 2, "apf_change": 3, "tick": 4, "host_attn": 5}
-INPUTS = ("seq_req", "seq_we", "seq_addr", "seq_wdata", "batch_busy", "cycle_busy", "apf", "efault", "cycle_done",
-          "batch_done", "slave_lost", "spi_miso")
 
 
 def reg(name):
@@ -26,20 +24,25 @@ def reg(name):
 class TB:
     """The chip without its line, and the real core as a hand that does one access at a time (soc_probe.c)."""
 
+    PERIOD_NS = 10
+    INPUTS = ("seq_req_i", "seq_we_i", "seq_addr_i", "seq_wdata_i", "batch_busy_i", "cycle_busy_i", "apf_i", "efault_i",
+              "cycle_done_i", "batch_done_i", "slave_lost_i", "spi_miso_i")
+
     def __init__(self, dut):
         self.dut, self.clk = dut, dut.clk_i
         self.us = int(dut.ClkHz.value) // 1_000_000                # clocks per us
-        Clock(dut.clk_i, 10, unit="ns", impl="gpi").start()
+        Clock(dut.clk_i, self.PERIOD_NS, unit="ns", impl="gpi").start()
         self.host = Port(dut, "host", dut.clk_i)
-        for name in INPUTS:
-            getattr(dut, f"{name}_i").value = 0
+        for name in self.INPUTS:
+            getattr(dut, name).value = 0
         dut.rst_i.value = 1
 
     async def start(self):
-        await self.host_write(ALIVE, 0, reset=True)
+        self.dut.rst_i.value = 1
         await ClockCycles(self.clk, 3)
         self.dut.rst_i.value = 0
         await RisingEdge(self.clk)
+        await self.host_write(ALIVE, 0)                            # older than this test; the core is slower than this
         for _ in range(100):
             if await self.host_read(ALIVE) == 0x600DB007:
                 return
@@ -49,12 +52,8 @@ class TB:
     async def host_read(self, word):
         return (await self.host.access(word))[0]
 
-    async def host_write(self, word, value, reset=False):
-        if reset:                                                  # the memory is older than the reset of this test
-            self.dut.rst_i.value = 0
-            await RisingEdge(self.clk)
+    async def host_write(self, word, value):
         await self.host.access(word, 1, 15, value)
-        self.dut.rst_i.value = int(reset)
 
     async def begin(self, op, addr=0, data=0):
         await self.host_write(ADDR, addr)

@@ -144,7 +144,7 @@ module asi_seq
     unique case (state_q)
       // StIdle: nothing runs
       StIdle: begin
-        first_d = 1'b0;  was_mgmt_d = 1'b0;  paced_d = 1'b1;
+        first_d = 1'b0;  paced_d = 1'b1;
         cur_d = '0;  nxt_d = 6'd1;  wrap_d = 1'b0;  cnt_d = '0;
         if (batch_start_i)               begin state_d = StBatchLen; kind_d = KindBatch; end
         else if (cycle_en_i && enable_i) begin state_d = StScan;     kind_d = KindDexg;  end
@@ -341,11 +341,54 @@ module asi_seq
     again_q <= rst_i ? 1'b0 : again_d;
     snap_q  <= rst_i ? 1'b0 : snap_d;
     first_q <= rst_i ? 1'b0 : first_d;
+    was_mgmt_q <= rst_i ? 1'b0 : was_mgmt_d;
     // no reset needed: StIdle or the step that uses them sets these
     {kind_q, cur_q, nxt_q, nxt_v_q, wrap_q, cnt_q} <= {kind_d, cur_d, nxt_d, nxt_v_d, wrap_d, cnt_d};
-    {a_q, b_q, ext_q, ext_b_q, pend_q, was_mgmt_q, lost_q} <= {a_d, b_d, ext_d, ext_b_d, pend_d, was_mgmt_d, lost_d};
+    {a_q, b_q, ext_q, ext_b_q, pend_q, lost_q} <= {a_d, b_d, ext_d, ext_b_d, pend_d, lost_d};
     {call_q, no_reply_q, retries_q, tag_q} <= {call_d, no_reply_d, retries_d, tag_d};
     {last_q, rfirst_q, data_q, repeats_q} <= {last_d, rfirst_d, data_d, repeats_d};
     {us_q, paced_q} <= {us_d, paced_d};
   end
+
+`ifndef SYNTHESIS
+  // MaxOfferClocks: from a result that the sequencer waits for to the next offer, on the longest way (last DEXG, no extra
+  // call, publication). The shortest gap after a result is 48 clocks (P_GAP_NORSP at 8 MHz).
+  localparam int unsigned MaxOfferClocks = 36;
+  int unsigned since_q;
+  logic        timed_q;
+  logic [13:0] offered_q;  // the request may not change while it is offered
+  logic        held_q;
+  always_ff @(posedge clk_i) begin
+    // ends with the offer, with a wait on purpose, and where a cycle without any telegram begins
+    timed_q <= !rst_i && (timed_q ? !valid_q && state_q != StIdle && !(state_q == StPace && !paced_q) &&
+                                    !(state_q == StPick && !offer && snap_q)
+                                  : res_valid_i && state_q == StWait && !sent_q && !again_q);
+    since_q <= timed_q ? since_q + 1 : 1;
+    held_q    <= !rst_i && req_valid_o && !req_ready_i;
+    offered_q <= {call_q, retries_q, no_reply_q};
+    if (!rst_i) begin
+      Offer_A:    assert (!timed_q || since_q <= MaxOfferClocks);
+      Held_A:     assert (!held_q || !enable_i || (req_valid_o && offered_q == {call_q, retries_q, no_reply_q}));
+      OneCall_A:  assert (!offer || !open_q);
+      Result_A:   assert (!res_valid_i || (open_q && !valid_q && !res_q));
+      Books_A:    assert (!res_q || state_q inside {StScan, StCopy, StLoad, StWait, StTally});
+      Tally_A:    assert (!sent_i || !sent_q);          // no request is left uncounted
+      Index_A:    assert (!load_dexg || nxt_q[4:0] != '0);
+      Write_A:    assert (!mem_we_o || mem_req_o);
+      Atomic_A:   assert (state_q != StCopy || mem_req_o);  // no free clock for the core inside a copy
+      Events_A:   assert (!(cycle_done_o && is_batch) && !(batch_done_o && !is_batch));
+      Published_A: assert (!cycle_done_o || !open_q);
+      Lost_C:     cover (slave_lost_o);
+      OnlyLost_C: cover (state_q == StInWr && lost_q && cur_q == nxt_q && nxt_v_q);
+      Alternate_C: cover (state_q == StPick && pend_q && !do_mgmt);
+      Both_C:     cover (state_q == StPick && kind_q == KindMgmt && do_incl);
+      Empty_C:    cover (state_q == StPace && paced_q && first_q);
+      Hold_C:     cover (state_q == StLoad && nxt_v_q && !snap_q && first_q);
+      Withdrawn_C: cover (state_q == StWait && valid_q && !enable_i);
+      AbortScan_C: cover (state_q == StScan && res_valid_i);
+      Batch_C:    cover (batch_done_o && nxt_q == '0);
+      Pace_C:     cover (state_q == StPace && !paced_q);
+    end
+  end
+`endif
 endmodule

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+import cocotb
+from asi import regmap, telegram
+from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge, Timer
+from cocotb.utils import get_sim_time
+
+from cocotb_tests.block.cocotb_soc import LINK, TB, reg
+
+BATCH, SLOT, STATE = (LINK + getattr(regmap, f"LINK_{n}") for n in ("BATCH", "SLOT", "SLOT_STATE"))
+NO_RESPONSE, ABORTED = 1, 15
+BATCH_DONE, CYCLE_DONE, APF_CHANGE = 2, 1, 8
+OFFLINE, DETECTION, DATA_EXCHANGE = 0, 1, 3
+
+
+def link(name):
+    return LINK + getattr(regmap, f"LINK_{name}")
+
+
+class MasterTB(TB):
+    """asi_master with the probe program (soc_probe.c); logs the line and answers like a synchronous slave."""
+
+    PERIOD_NS = 125                                                # 8 MHz
+    INPUTS = ("rx_p_i", "rx_n_i", "apf_ni", "efault_i", "spi_miso_i")
+
+    def __init__(self, dut):
+        super().__init__(dut)
+        self.trains, self.answers = [], {}                         # requests on the line; call -> answer nibble
+        self.table = {tuple(telegram.request_pulses(call)): call for call in range(2048)}
+        cocotb.start_soon(self._line())
+
+    async def _line(self):
+        first = -10**9
+        while True:
+            await self.dut.tx_man_o.value_change
+            now = round(get_sim_time("ns"))
+            if not int(self.dut.tx_en_o.value):
+                continue
+            if now - first > 78_000:
+                first = now
+                self.trains.append([])
+            self.trains[-1].append((now - first, 1 if int(self.dut.tx_man_o.value) else -1))
+            if now - first == 78_000:
+                call = self.table.get(tuple(self.trains[-1]))
+                if call in self.answers:
+                    cocotb.start_soon(self._answer(self.answers[call]))
+
+    async def _answer(self, data):
+        at = 0
+        for t, polarity in telegram.response_pulses(data):
+            await Timer(t + 21_500 - at, "ns")
+            pin = self.dut.rx_p_i if polarity > 0 else self.dut.rx_n_i
+            pin.value = 1
+            await Timer(1_500, "ns")
+            pin.value = 0
+            at = t + 23_000
+
+    def calls(self):
+        """Requests so far; a train that is no legal telegram gives None."""
+        return [self.table.get(tuple(train)) for train in self.trains]
+
+    async def event(self, bit, limit=200):
+        """Wait for an event and clear it."""
+        for _ in range(limit):
+            if await self.peek(reg("EVENT")) & bit:
+                await self.poke(reg("EVENT"), bit)
+                return
+        raise AssertionError(f"event {bit} never came")
+
+    async def power_up(self, line_en=True):
+        self.dut.apf_ni.value = 1
+        await self.start()
+        await self.event(APF_CHANGE)
+        await self.poke(reg("CTRL"), line_en << 3)
+
+
+@cocotb.test(timeout_time=50, timeout_unit="ms")
+async def power_fail(dut):
+    """LT-010, LT-011, EX-021: APF until power was good; with APF a batch ends ABORTED and the line stays silent."""
+    tb = MasterTB(dut)
+    await tb.start()                                               # apf_ni is 0: no power
+    await tb.poke(reg("CTRL"), 8)
+    assert await tb.peek(reg("STATUS")) == 4
+    dut.efault_i.value = 1
+    assert await tb.peek(reg("STATUS")) == 4 + 8
+    dut.efault_i.value = 0
+    call = telegram.encode_call("RDIO", 5)
+    tb.answers[call] = 7
+
+    async def batch():
+        await tb.poke(BATCH, call)
+        await tb.poke(reg("BATCH"), 1)
+        await tb.event(BATCH_DONE)
+        return await tb.peek(BATCH)
+    assert await batch() >> 4 & 15 == ABORTED and tb.calls() == []
+    dut.apf_ni.value = 1
+    await tb.event(APF_CHANGE)
+    assert await tb.peek(reg("STATUS")) == 0
+    assert await batch() & 0xFF == 7 and tb.calls() == [call]
+    dut.apf_ni.value = 0
+    await tb.event(APF_CHANGE)
+    assert await tb.peek(reg("STATUS")) == 4
+    assert await batch() >> 4 & 15 == ABORTED and tb.calls() == [call]
+
+
+@cocotb.test(timeout_time=50, timeout_unit="ms")
+async def batch_on_the_line(dut):
+    """LK-010, TL-006: requests written by the core leave as pulses, answers and classes come back, one event."""
+    tb = MasterTB(dut)
+    await tb.power_up()
+    calls = [telegram.encode_call("RDIO", 5), telegram.encode_call("RDID", 37), telegram.encode_call("WPAR", 5, 0xA)]
+    tb.answers = {calls[0]: 0x7, calls[2]: 0x5}
+    for k, call in enumerate(calls):
+        await tb.poke(BATCH + 4 * k, call | 1 << regmap.REQUEST_RETRIES_LSB)
+    await tb.poke(reg("EXEC"), DETECTION)
+    await tb.poke(reg("BATCH"), len(calls))
+    assert await tb.peek(reg("STATUS")) & 1 and int(dut.phase_o.value) == DETECTION
+    await tb.event(BATCH_DONE)
+    assert await tb.peek(reg("STATUS")) == 0
+    results = [await tb.peek(BATCH + 4 * k) & 0x3FFF for k in range(3)]
+    assert results == [0x0007, 1 << 12 | NO_RESPONSE << 8 | NO_RESPONSE << 4 | results[1] & 15, 0x0005]
+    assert tb.calls() == [calls[0], calls[1], calls[1], calls[2]]
+
+
+@cocotb.test(timeout_time=50, timeout_unit="ms")
+async def cycle_on_the_line(dut):
+    """LK-001, LK-007, LK-012, LK-014: a cycle calls the active slots, publishes the inputs, keeps its period; sync and phase."""
+    tb = MasterTB(dut)
+    await tb.power_up()
+    for word in range(0x200, 0x3A0, 4):                            # no extra requests, images and counters 0
+        await tb.poke(LINK + word, 0)
+    calls = {5: telegram.encode_call("DEXG", 5, 3), 9: telegram.encode_call("DEXG", 9, 12)}
+    for index, call in calls.items():
+        await tb.poke(STATE + 4 * index, 0)
+        await tb.poke(SLOT + 4 * index, 1)
+        word = link("OUT_IMG") + 4 * (index // 8)
+        await tb.poke(word, await tb.peek(word) | (call & 15) << 4 * (index % 8))
+    tb.answers = {calls[5]: 0xB, calls[9]: 0x6}
+    syncs, phases = [], set()
+
+    async def watch_sync():
+        while True:
+            await RisingEdge(dut.sync_o)
+            syncs.append(round(get_sim_time("ns")) // tb.PERIOD_NS)
+            phases.add(int(dut.phase_o.value))
+            await FallingEdge(tb.clk)
+            await FallingEdge(tb.clk)
+            assert int(dut.sync_o.value) == 0
+    cocotb.start_soon(watch_sync())
+    await tb.poke(reg("CTRL"), 8 | 1 | 1000 << 16)                 # cycles of 1000 us
+    for _ in range(4):
+        await tb.event(CYCLE_DONE)
+    assert await tb.peek(link("IN_IMG")) == 0xB << 20 and await tb.peek(link("IN_IMG") + 4) == 6 << 4
+    await tb.poke(reg("CTRL"), 8)
+    await ClockCycles(tb.clk, 8 * 1000)
+    assert await tb.peek(reg("STATUS")) == 0 and int(dut.phase_o.value) == OFFLINE
+    cycles = await tb.peek(link("CYCLES"))
+    assert cycles >= 4 and len(syncs) == cycles and phases == {DATA_EXCHANGE}
+    assert tb.calls() == [calls[5], calls[9]] * cycles
+    assert await tb.peek(link("SENT")) == 2 * cycles
+    periods = [b - a for a, b in zip(syncs, syncs[1:])]
+    assert min(periods) >= 1000 * tb.us, periods
+    assert max(periods[1:]) - min(periods[1:]) <= 1, periods       # the first cycle starts from rest
+
