@@ -411,10 +411,11 @@ static void inclusion_request(asi_ec_t *ec, unsigned step)
 /** EX-012: the next address not in LAS, 0 included, all of Sel = 0, then all of Sel = 1, wrapping. */
 static void probe_next(asi_ec_t *ec)
 {
-    unsigned i = ec->inclusion_index;
-    do {
-        i = (i + 1u) & 63u;
-    } while (i == 32u || asi_list_has(&ec->state.las, i)); /* ends: 0 is never in LAS */
+    const asi_list_t all = {{0xFFFFFFFFu, 0xFFFFFFFEu}};
+    const asi_list_t candidates = asi_list_without(&all, &ec->state.las);
+    unsigned i = asi_list_next(&candidates, ec->inclusion_index + 1u);
+    if (i == ASI_INDICES)
+        i = 0; /* always a candidate: never in LAS */
     ec->inclusion_index = (uint8_t)i;
     ec->inclusion_failures = 0;
     inclusion_request(ec, PROBE);
@@ -530,11 +531,14 @@ asi_status_t asi_ec_cycle_done(asi_ec_t *ec, const asi_cycle_report_t *report)
     return ASI_OK;
 }
 
-asi_status_t asi_ec_slave_lost(asi_ec_t *ec, unsigned index)
+asi_status_t asi_ec_slave_lost(asi_ec_t *ec, const asi_list_t *lost)
 {
-    if (index >= ASI_INDICES || !asi_list_has(&ec->state.las, index))
+    const asi_list_t others = asi_list_without(&ec->state.las, lost);
+    const asi_list_t gone = asi_list_without(&ec->state.las, &others);
+    if (asi_list_is_empty(&gone))
         return ASI_E_STATE;
-    leave_lds(ec, index); /* EX-015; found again by inclusion */
+    for (unsigned i = asi_list_next(&gone, 0u); i < ASI_INDICES; i = asi_list_next(&gone, i + 1u))
+        leave_lds(ec, i); /* EX-015; found again by inclusion */
     run_cycle(ec);
     update_flags(ec);
     return ASI_OK;

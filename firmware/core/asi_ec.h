@@ -101,8 +101,9 @@ void asi_ec_power(asi_ec_t *ec, bool apf);
 asi_status_t asi_ec_batch_done(asi_ec_t *ec, const asi_result_t *results, unsigned n);
 /** A cycle ended. @return ASI_E_STATE: not in normal operation, nothing changed */
 asi_status_t asi_ec_cycle_done(asi_ec_t *ec, const asi_cycle_report_t *report);
-/** A slave failed P_FAIL_CYCLES cycles and is no longer called. @return ASI_E_STATE: not in LAS, nothing changed */
-asi_status_t asi_ec_slave_lost(asi_ec_t *ec, unsigned index);
+/** These slaves failed P_FAIL_CYCLES cycles and are no longer called: all at once, as after a broken cable.
+ * @return ASI_E_STATE: none of them is in LAS, nothing changed */
+asi_status_t asi_ec_slave_lost(asi_ec_t *ec, const asi_list_t *lost);
 
 /* ---- from above ---- */
 /** Protected or configuration mode; a change passes through OFFLINE (EX-023). */

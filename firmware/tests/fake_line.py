@@ -186,8 +186,8 @@ class Master:
             self.incl_result = self.run(p.inclusion)
             self.mgmt_last = False
         self.cycle_number += 1
-        for index in lost:
-            self.lib.fw_slave_lost(index)
+        if lost:
+            self.lose(lost)
         self.fresh_slots()
         if report:
             words = [sum(self.in_work[8 * w + k] << 4 * k for k in range(8)) for w in range(8)]
@@ -196,6 +196,10 @@ class Master:
             self.fresh_slots()
             self.check()
         return True
+
+    def lose(self, indices):
+        bits = sum(1 << i for i in indices)
+        return self.lib.fw_slave_lost([bits & 0xFFFFFFFF, bits >> 32])
 
     @staticmethod
     def words(nibbles):

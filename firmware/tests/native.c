@@ -138,7 +138,12 @@ int fw_cycle_done(fw_result management, fw_result inclusion, const uint32_t in[8
     return asi_ec_cycle_done(&ec, &report);
 }
 
-int fw_slave_lost(unsigned index) { return asi_ec_slave_lost(&ec, index); }
+int fw_slave_lost(const uint32_t lost[2])
+{
+    const asi_list_t list = {{lost[0], lost[1]}};
+    return asi_ec_slave_lost(&ec, &list);
+}
+
 void fw_set_mode(int protected_mode) { asi_ec_set_mode(&ec, protected_mode != 0); }
 void fw_set_offline(int offline) { asi_ec_set_offline(&ec, offline != 0); }
 void fw_set_data_exchange(int active) { asi_ec_set_data_exchange(&ec, active != 0); }

@@ -45,7 +45,7 @@ void fw_tick(uint32_t us);
 void fw_power(int apf);
 int fw_batch_done(const fw_result *results, unsigned n);
 int fw_cycle_done(fw_result management, fw_result inclusion, const uint32_t in[8]);
-int fw_slave_lost(unsigned index);
+int fw_slave_lost(const uint32_t lost[2]);
 void fw_set_mode(int protected_mode);
 void fw_set_offline(int offline);
 void fw_set_data_exchange(int active);

@@ -388,7 +388,7 @@ def test_lost_slave():
     s = m.read()
     assert s["las"] == s["lds"] == {1, 4} and s["cdi"][36] == 0xFFFF and s["in"][36] == 0 and not m.port.active[36]
     assert s["in"][4] == 9 and 36 in s["changed"]
-    assert m.lib.fw_slave_lost(36) == BAD_STATE
+    assert m.lose([36]) == BAD_STATE
     m.slaves[2].power_up()
     m.slaves[2].present = True
     m.rounds()
@@ -539,7 +539,7 @@ def test_refused_functions_change_nothing():
     assert m.lib.fw_set_projection(lps, pcd, [*pp[:63], 16]) == BAD_ARG
     for name in ("ADRA", "WID1", "DELA", "BR01", "PRGM", "R1", "DEXG"):
         assert m.lib.fw_manage(encode_call(name, 1, 5)) == BAD_ARG, name
-    assert m.lib.fw_slave_lost(2) == m.lib.fw_slave_lost(64) == BAD_STATE
+    assert m.lose([2, 0, 32]) == m.lose([]) == BAD_STATE
     assert m.lib.fw_batch_done([(0, 0, 0)], 1) == BAD_STATE
     assert m.read() == before and m.port.managements == 0
     m.set_offline(True)
