@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file asi_hal.h  Registers, link RAM and interrupts for the application; the port of the core (asi_port.h) is in asi_hal.c.
+ * @file asi_hal.h  Registers, link RAM and interrupts for the application. asi_hal.c also holds the port of the core.
  * Context: everything but hal_init, hal_sleep and hal_fatal runs in the interrupt or with it masked.
  */
 #ifndef ASI_HAL_H

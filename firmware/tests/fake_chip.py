@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A firmware image on the real soft core; Python plays sequencer, line and host while the core sleeps.
 
-One thing happens at a time: the core runs until it sleeps in WAIT, then a batch, a cycle or a tick is played and its event
-set. Bus time is what calls take (154 us each), so awake times compare with the cycle.
+One thing happens at a time: the core runs until it sleeps in WAIT, then a batch, a cycle or a tick is played and its
+event set. Bus time is what calls take (154 us each), so awake times compare with the cycle.
 """
 import functools
 import os
@@ -32,9 +32,10 @@ def load():
         core = f"{pythondata_cpu_vexriscv.data_location}/VexRiscv_Min.v"
         part = BUILD / f"part{os.getpid()}"
         part.mkdir(parents=True, exist_ok=True)
-        subprocess.run(["verilator", "--cc", "--exe", "--build", "-j", "1", "-O3", "--x-assign", "fast", "-Wno-fatal", "-Wno-lint",
-                        "--top-module", "VexRiscv", "--prefix", "VVexRiscv", "--Mdir", str(part), "-o", "libfwsoc.so",
-                        "-CFLAGS", f"-fPIC -O2 -I{ROOT}/firmware/generated", "-LDFLAGS", "-shared", core, str(sources[0])],
+        subprocess.run(["verilator", "--cc", "--exe", "--build", "-j", "1", "-O3", "--x-assign", "fast", "-Wno-fatal",
+                        "-Wno-lint", "--top-module", "VexRiscv", "--prefix", "VVexRiscv", "--Mdir", str(part),
+                        "-o", "libfwsoc.so", "-CFLAGS", f"-fPIC -O2 -I{ROOT}/firmware/generated", "-LDFLAGS", "-shared", core,
+                        str(sources[0])],
                        check=True, stdout=subprocess.DEVNULL)
         os.replace(part / "libfwsoc.so", library)
     return ffi, ffi.dlopen(str(library))
@@ -53,7 +54,8 @@ def link_at(name):
 def image(name):
     """build/firmware/<name>.hex, made when it is missing or old -> words"""
     venv = os.environ["VERILATOR_ROOT"].rsplit("/lib/", 1)[0]
-    subprocess.run(["make", "-s", f"VENV={venv}", f"build/firmware/{name}.hex"], check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
+    subprocess.run(["make", "-s", f"VENV={venv}", f"build/firmware/{name}.hex"], check=True, cwd=ROOT,
+                   stdout=subprocess.DEVNULL)
     return [int(line, 16) for line in (ROOT / f"build/firmware/{name}.hex").read_text().split()]
 
 

@@ -45,7 +45,8 @@ void asi_port_cycle(bool run, bool two_extra, uint16_t min_cycle_us)
 
 void asi_port_slot(unsigned index, bool active, bool extended)
 {
-    if (index >= 64 || index == 0 || index == 32 || port.active[index] == active || (index > 32 && active && !extended)) {
+    const bool known = index < 64 && index != 0 && index != 32;
+    if (!known || port.active[index] == active || (index > 32 && active && !extended)) {
         port.violations++;
         return;
     }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file native.h  The protocol core as a native library for tests: a flat interface for cffi (ABI mode), and the port as a
- * record of what the core asked for. One line, global, single-threaded. Declarations between the markers are read by
- * firmware/tests/native.py.
+ * @file native.h  The protocol core as a native library for tests: a flat interface for cffi (ABI mode), and the port
+ * as a record of what the core asked for. One line, global, single-threaded. Declarations between the markers are read
+ * by firmware/tests/native.py.
  */
 #ifndef FW_NATIVE_H
 #define FW_NATIVE_H

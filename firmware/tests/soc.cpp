@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// @file soc.cpp  See soc.h. Every access takes two clocks (request, then ready with data), as with a synchronous memory.
+/// @file soc.cpp  See soc.h. Every access takes two clocks (request, then ready with data), as in synchronous memory.
 #include "soc.h"
 #include <cstring>
 #include <memory>
@@ -77,7 +77,7 @@ void reg_write(uint32_t offset, uint32_t data) {
     }
 }
 
-/// published state, from FLAGS to IN_IMG and from CDI to the end without PCD and PP, may change only while IN_SEQ is odd
+/// published state, FLAGS to IN_IMG and CDI to the end without PCD and PP, may change only while IN_SEQ is odd
 void check_published(uint32_t offset) {
     const bool lists = offset >= offsetof(asi_host_t, FLAGS) && offset < offsetof(asi_host_t, IN_SEQ);
     const bool image = offset >= offsetof(asi_host_t, IN_IMG) && offset < offsetof(asi_host_t, OUT_IMG);
@@ -99,7 +99,10 @@ uint32_t bus_read(uint32_t a) {
 
 void bus_write(uint32_t a, uint32_t data, uint32_t be) {
     if (a < sizeof ram) write_masked(ram[a / 4], data, be);
-    else if (a >> 14 == 0x40000000u >> 14) { check_published(a & 0x3FFF); write_masked(window[(a & 0x3FFF) / 4], data, be); }
+    else if (a >> 14 == 0x40000000u >> 14) {
+        check_published(a & 0x3FFF);
+        write_masked(window[(a & 0x3FFF) / 4], data, be);
+    }
     else if (a >> 10 == 0x80010000u >> 10 && be == 15) link_ram[(a & 0x3FF) / 4] = data;
     else if (a >> 8 == 0x80000000u >> 8 && be == 15) reg_write(a & 0xFF, data);
     else s.bad_accesses++;
