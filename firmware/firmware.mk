@@ -2,15 +2,16 @@
 # Firmware images: product, test (short P_PWR_SETTLE), boot ROM. Included from the top Makefile.
 FW       := $(BUILD)/firmware
 FW_CC    := $(VPY) -m ziglang cc
-# generic_rv32 is RV32I; -fno-builtin keeps memset from calling itself; all of RAM is ours, so -fno-delete-null-pointer-checks
+# generic_rv32 is RV32I; -fno-builtin keeps memset from calling itself; address 0 is RAM, hence the null-pointer flag
 FW_FLAGS := -target riscv32-freestanding-none -mcpu=generic_rv32 -mabi=ilp32 -std=c17 -Os -fno-unroll-loops -mno-relax \
-            -ffreestanding -fno-builtin -fno-sanitize=all -fno-delete-null-pointer-checks -ffunction-sections -fdata-sections \
+            -ffreestanding -fno-builtin -fno-sanitize=all -fno-delete-null-pointer-checks \
+            -ffunction-sections -fdata-sections \
             -Wall -Wextra -Wconversion -Wshadow -Werror -Wframe-larger-than=256 -Wvla \
             $(addprefix -Ifirmware/,hal/include core hal app generated)
 FW_LINK  := -nostdlib -static -Wl,--gc-sections
 FW_SRC   := firmware/hal/startup.S $(wildcard firmware/core/*.c firmware/hal/*.c firmware/app/*.c)
-FW_DEPS  := $(FW_SRC) $(wildcard firmware/*/*.h firmware/hal/include/*.h) firmware/hal/firmware.ld firmware/firmware.mk \
-            tools/elf2hex.py
+FW_DEPS  := $(FW_SRC) $(wildcard firmware/*/*.h firmware/hal/include/*.h) firmware/hal/firmware.ld \
+            firmware/firmware.mk tools/elf2hex.py
 FW_RAM   := $(shell echo $$((62 * 1024)))  # 64 KB without the stack
 
 .PHONY: firmware

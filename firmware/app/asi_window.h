@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file asi_window.h  The native host window (rdl/asi.rdl, asi_host): commits in, published state out (HW-001 .. HW-005).
+ * @file asi_window.h  The native host window (rdl/asi.rdl, asi_host): commits in, published state out (HW-001 .. 005).
  * Everything the firmware publishes changes only while IN_SEQ is odd.
  */
 #ifndef ASI_WINDOW_H

@@ -22,8 +22,8 @@ void asi_interrupt(void)
         (void)asi_ec_batch_done(&ec, results, n); /* refused: a batch that was given up */
     }
     if (events & HAL_SLAVE_LOST) {
-        for (unsigned i = hal_next_lost(0); i < ASI_INDICES; i = hal_next_lost(i + 1u))
-            (void)asi_ec_slave_lost(&ec, i);
+        const asi_list_t lost = hal_lost_slaves();
+        (void)asi_ec_slave_lost(&ec, &lost);
     }
     if (events & HAL_CYCLE_DONE) {
         asi_cycle_report_t report;

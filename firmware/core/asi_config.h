@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file asi_config.h  Constants of execution control: names as in docs/requirements.md, units in the name or the comment.
+ * @file asi_config.h  Constants of execution control: names as in docs/requirements.md, units in name or comment.
  * Each may be overridden with -D (ASI_PWR_SETTLE_US for test images). Line timing lives in rtl/phy/asi_timing_pkg.sv.
  */
 #ifndef ASI_CONFIG_H
@@ -38,7 +38,7 @@
 #define ASI_EMPTY_CYCLE_US 1000u
 #endif
 
-/** P_FAIL_CYCLES, cycles: the sequencer's limit of failed cycles in a row, SLOT_STATE.streak of a lost slave (LK-004). */
+/** P_FAIL_CYCLES, cycles: the sequencer's limit of failures in a row, SLOT_STATE.streak of a lost slave (LK-004). */
 #define ASI_FAIL_CYCLES 3u
 
 _Static_assert(ASI_CMD_RETRY <= 3u, "the request word has two bits for repetitions");

@@ -87,7 +87,7 @@ static void set_echo(asi_ec_t *ec, unsigned index, uint8_t echo)
 
 /* ------------------------------------------------------------------------------------------ images */
 
-/** Line level of the outputs (CA-005): idle F, payload of active slaves inverted. I3 of A/B calls comes from the sequencer. */
+/** Line level of the outputs (CA-005): idle F, payload of active slaves inverted. I3 of A/B calls is not ours. */
 static void send_outputs(asi_ec_t *ec)
 {
     bool changed = false;
@@ -389,7 +389,7 @@ asi_status_t asi_ec_batch_done(asi_ec_t *ec, const asi_result_t *results, unsign
 
 enum { PROBE, INCLUDE_ID, INCLUDE_ID1, INCLUDE_ID2, INCLUDE_WPAR, INCLUDE_DEXG }; /* ec->inclusion_step */
 
-/** The request of this step, for all slots until the next one. One try per slot: repetitions are further slots (EX-013). */
+/** The request of this step, for all slots until the next one. A repetition is a further slot (EX-013). */
 static void inclusion_request(asi_ec_t *ec, unsigned step)
 {
     static const uint8_t read[] = {ASI_CMD_RDIO, ASI_CMD_RDID, ASI_CMD_RID1, ASI_CMD_RID2};
@@ -411,10 +411,11 @@ static void inclusion_request(asi_ec_t *ec, unsigned step)
 /** EX-012: the next address not in LAS, 0 included, all of Sel = 0, then all of Sel = 1, wrapping. */
 static void probe_next(asi_ec_t *ec)
 {
-    unsigned i = ec->inclusion_index;
-    do {
-        i = (i + 1u) & 63u;
-    } while (i == 32u || asi_list_has(&ec->state.las, i)); /* ends: 0 is never in LAS */
+    const asi_list_t all = {{0xFFFFFFFFu, 0xFFFFFFFEu}};
+    const asi_list_t candidates = asi_list_without(&all, &ec->state.las);
+    unsigned i = asi_list_next(&candidates, ec->inclusion_index + 1u);
+    if (i == ASI_INDICES)
+        i = 0; /* always a candidate: never in LAS */
     ec->inclusion_index = (uint8_t)i;
     ec->inclusion_failures = 0;
     inclusion_request(ec, PROBE);
@@ -438,7 +439,8 @@ static void candidate_read(asi_ec_t *ec)
     const asi_list_t lds = ec->state.lds, las = ec->state.las;
     const uint16_t codes = ec->state.cdi[i];
     enter_lds(ec, i, ec->inclusion_codes);
-    if (codes != ec->inclusion_codes || !asi_list_equal(&lds, &ec->state.lds) || !asi_list_equal(&las, &ec->state.las)) {
+    if (codes != ec->inclusion_codes || !asi_list_equal(&lds, &ec->state.lds) ||
+        !asi_list_equal(&las, &ec->state.las)) {
         run_cycle(ec); /* LAS may have become empty (EX-026) */
         update_flags(ec);
     }
@@ -530,11 +532,14 @@ asi_status_t asi_ec_cycle_done(asi_ec_t *ec, const asi_cycle_report_t *report)
     return ASI_OK;
 }
 
-asi_status_t asi_ec_slave_lost(asi_ec_t *ec, unsigned index)
+asi_status_t asi_ec_slave_lost(asi_ec_t *ec, const asi_list_t *lost)
 {
-    if (index >= ASI_INDICES || !asi_list_has(&ec->state.las, index))
+    const asi_list_t others = asi_list_without(&ec->state.las, lost);
+    const asi_list_t gone = asi_list_without(&ec->state.las, &others);
+    if (asi_list_is_empty(&gone))
         return ASI_E_STATE;
-    leave_lds(ec, index); /* EX-015; found again by inclusion */
+    for (unsigned i = asi_list_next(&gone, 0u); i < ASI_INDICES; i = asi_list_next(&gone, i + 1u))
+        leave_lds(ec, i); /* EX-015; found again by inclusion */
     run_cycle(ec);
     update_flags(ec);
     return ASI_OK;
@@ -631,7 +636,8 @@ asi_status_t asi_ec_set_projection(asi_ec_t *ec, const asi_projection_t *project
         return status;
     ec->projection = projection;
     if (ec->protected_mode && ec->state.phase == ASI_PHASE_DATA_EXCHANGE) { /* EX-009 */
-        for (unsigned i = asi_list_next(&ec->state.las, 0u); i < ASI_INDICES; i = asi_list_next(&ec->state.las, i + 1u)) {
+        const asi_list_t las = ec->state.las;
+        for (unsigned i = asi_list_next(&las, 0u); i < ASI_INDICES; i = asi_list_next(&las, i + 1u)) {
             if (!may_activate(ec, i))
                 leave_las(ec, i);
         }

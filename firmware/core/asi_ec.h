@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file asi_ec.h  Execution control of one AS-i line: OFFLINE, DETECTION, ACTIVATION, normal operation (EX-001 .. EX-026).
- * Layer: protocol core; knows no register and no clock. Memory: one asi_ec_t, owned by the caller; nothing is allocated.
+ * @file asi_ec.h  Execution control of one AS-i line: OFFLINE, DETECTION, ACTIVATION, normal operation (EX-001 .. 026).
+ * Layer: protocol core; knows no register and no clock. Memory: one asi_ec_t, owned by the caller, nothing else.
  * Context: not reentrant. All functions run in the interrupt, or with it masked.
  * Images are at host level here; the line level (CA-005) exists only below asi_port.h.
  */
@@ -101,8 +101,9 @@ void asi_ec_power(asi_ec_t *ec, bool apf);
 asi_status_t asi_ec_batch_done(asi_ec_t *ec, const asi_result_t *results, unsigned n);
 /** A cycle ended. @return ASI_E_STATE: not in normal operation, nothing changed */
 asi_status_t asi_ec_cycle_done(asi_ec_t *ec, const asi_cycle_report_t *report);
-/** A slave failed P_FAIL_CYCLES cycles and is no longer called. @return ASI_E_STATE: not in LAS, nothing changed */
-asi_status_t asi_ec_slave_lost(asi_ec_t *ec, unsigned index);
+/** These slaves failed P_FAIL_CYCLES cycles and are no longer called: all at once, as after a broken cable.
+ * @return ASI_E_STATE: none of them is in LAS, nothing changed */
+asi_status_t asi_ec_slave_lost(asi_ec_t *ec, const asi_list_t *lost);
 
 /* ---- from above ---- */
 /** Protected or configuration mode; a change passes through OFFLINE (EX-023). */
@@ -121,7 +122,7 @@ ASI_MUST_USE asi_status_t asi_ec_check_projection(const asi_projection_t *projec
 ASI_MUST_USE asi_status_t asi_ec_set_projection(asi_ec_t *ec, const asi_projection_t *projection);
 /** Output image of the host, for the cycles from now on. */
 void asi_ec_set_outputs(asi_ec_t *ec, const uint32_t image[ASI_IMAGE_WORDS]);
-/** One call to one slave in the next management slots, with P_CMD_RETRY repetitions: WPAR, RES, RDIO, RDID, RID1, RID2, RDST.
+/** One call to one slave in the next management slot, P_CMD_RETRY repetitions: WPAR, RES, RDIO, RDID, RID1, RID2, RDST.
  * @return ASI_E_ARG: another call; ASI_E_STATE: no normal operation; ASI_E_BUSY: one is open */
 ASI_MUST_USE asi_status_t asi_ec_manage(asi_ec_t *ec, uint16_t call);
 /** Result of the last asi_ec_manage.

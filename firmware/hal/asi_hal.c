@@ -150,13 +150,14 @@ void hal_cycle_report(asi_cycle_report_t *report)
     }
 }
 
-unsigned hal_next_lost(unsigned from)
+asi_list_t hal_lost_slaves(void)
 {
-    unsigned i = asi_list_next(&slots, from);
-    while (i < ASI_INDICES &&
-           (LINK(SLOT_STATE)[i] & SLOT_STATE_R__STREAK_bm) >> SLOT_STATE_R__STREAK_bp < ASI_FAIL_CYCLES)
-        i = asi_list_next(&slots, i + 1u);
-    return i;
+    asi_list_t lost = ASI_LIST_EMPTY;
+    for (unsigned i = asi_list_next(&slots, 0u); i < ASI_INDICES; i = asi_list_next(&slots, i + 1u)) {
+        if ((LINK(SLOT_STATE)[i] & SLOT_STATE_R__STREAK_bm) >> SLOT_STATE_R__STREAK_bp >= ASI_FAIL_CYCLES)
+            asi_list_add(&lost, i);
+    }
+    return lost;
 }
 
 bool hal_apf(void)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file asi_hal.h  Registers, link RAM and interrupts for the application; the port of the core (asi_port.h) is in asi_hal.c.
+ * @file asi_hal.h  Registers, link RAM and interrupts for the application. asi_hal.c also holds the port of the core.
  * Context: everything but hal_init, hal_sleep and hal_fatal runs in the interrupt or with it masked.
  */
 #ifndef ASI_HAL_H
@@ -33,8 +33,8 @@ uint32_t hal_take_events(void);
 unsigned hal_batch_results(const asi_result_t **results);
 /** Results and inputs of the last cycle. */
 void hal_cycle_report(asi_cycle_report_t *report);
-/** Next active slave from index `from` that is no longer called, or 64. */
-unsigned hal_next_lost(unsigned from);
+/** Active slaves that are no longer called. */
+asi_list_t hal_lost_slaves(void);
 /** Filtered power fail. */
 bool hal_apf(void);
 /** Bus time in us, wraps. */

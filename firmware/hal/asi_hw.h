@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file asi_hw.h  Where the generated maps lie (docs/architecture.md). The generated structs are packed, and a compiler may
- * read a packed word byte by byte: so only their offsets are used, and each access is one volatile word.
+ * @file asi_hw.h  Where the generated maps lie (docs/architecture.md). The generated structs are packed, and a
+ * compiler may read a packed word byte by byte: so only their offsets are used, and each access is one volatile word.
  */
 #ifndef ASI_HW_H
 #define ASI_HW_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
  * @file hal_vexriscv.h  All that is special to VexRiscv, for C and assembler. Another core: another file like this one.
- * The Min build has no mscratch and no mcycle, mtvec is write-only and direct, wfi does nothing (hence the WAIT register).
+ * The Min build has no mscratch and no mcycle, mtvec is write-only and direct, wfi does nothing (hence register WAIT).
  * External interrupts pass a mask CSR of the core's own before mie.MEIE.
  */
 #ifndef HAL_VEXRISCV_H

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fake of everything below the port: slaves as small objects, and the sequencer's contract (docs/architecture.md, asi_seq).
+"""A fake of everything below the port: slaves as small objects, and the contract of asi_seq (docs/architecture.md).
 
-No time, no pulses: one call in, one answer or error class out. Words of calls are decoded here a second time, on purpose.
+No time, no pulses: one call in, one answer or error class out. Calls are decoded here a second time, on purpose.
 """
 import random
 from collections import Counter
@@ -15,6 +15,7 @@ FLAGS = ("config_ok", "lds0", "auto_address_assign", "auto_address_available", "
          "normal_operation_active", "apf", "offline_ready", "periphery_ok")
 FAIL_CYCLES = 3
 TICK_US = 1024
+COMMANDS = {0x1C: "RES", 0x10: "RDIO", 0x11: "RDID", 0x12: "RID1", 0x13: "RID2", 0x1E: "RDST"}
 SETTLE_US = 1_000_000
 
 
@@ -61,7 +62,7 @@ class Slave:
             name = "WPAR" if info & 16 else "DEXG"
         else:
             select = 8 if sel else 0
-            name = {0x1C: "RES", 0x10: "RDIO", 0x11: "RDID", 0x12: "RID1", 0x13: "RID2", 0x1E: "RDST"}.get(info ^ select)
+            name = COMMANDS.get(info ^ select)
             if name is None:
                 return None
         self.heard[name] += 1
@@ -186,8 +187,8 @@ class Master:
             self.incl_result = self.run(p.inclusion)
             self.mgmt_last = False
         self.cycle_number += 1
-        for index in lost:
-            self.lib.fw_slave_lost(index)
+        if lost:
+            self.lose(lost)
         self.fresh_slots()
         if report:
             words = [sum(self.in_work[8 * w + k] << 4 * k for k in range(8)) for w in range(8)]
@@ -196,6 +197,10 @@ class Master:
             self.fresh_slots()
             self.check()
         return True
+
+    def lose(self, indices):
+        bits = sum(1 << i for i in indices)
+        return self.lib.fw_slave_lost([bits & 0xFFFFFFFF, bits >> 32])
 
     @staticmethod
     def words(nibbles):
@@ -336,7 +341,7 @@ def name_of(call):
     if not control:
         return "ADRA" if number == 0 else "WPAR" if info & 16 else "DEXG", number
     for sel in (0, 8):
-        name = {0x1C: "RES", 0x10: "RDIO", 0x11: "RDID", 0x12: "RID1", 0x13: "RID2", 0x1E: "RDST"}.get(info ^ sel)
+        name = COMMANDS.get(info ^ sel)
         if name:
             return name, number + 4 * sel
     return "?", number

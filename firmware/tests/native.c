@@ -45,7 +45,8 @@ void asi_port_cycle(bool run, bool two_extra, uint16_t min_cycle_us)
 
 void asi_port_slot(unsigned index, bool active, bool extended)
 {
-    if (index >= 64 || index == 0 || index == 32 || port.active[index] == active || (index > 32 && active && !extended)) {
+    const bool known = index < 64 && index != 0 && index != 32;
+    if (!known || port.active[index] == active || (index > 32 && active && !extended)) {
         port.violations++;
         return;
     }
@@ -138,7 +139,12 @@ int fw_cycle_done(fw_result management, fw_result inclusion, const uint32_t in[8
     return asi_ec_cycle_done(&ec, &report);
 }
 
-int fw_slave_lost(unsigned index) { return asi_ec_slave_lost(&ec, index); }
+int fw_slave_lost(const uint32_t lost[2])
+{
+    const asi_list_t list = {{lost[0], lost[1]}};
+    return asi_ec_slave_lost(&ec, &list);
+}
+
 void fw_set_mode(int protected_mode) { asi_ec_set_mode(&ec, protected_mode != 0); }
 void fw_set_offline(int offline) { asi_ec_set_offline(&ec, offline != 0); }
 void fw_set_data_exchange(int active) { asi_ec_set_data_exchange(&ec, active != 0); }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file native.h  The protocol core as a native library for tests: a flat interface for cffi (ABI mode), and the port as a
- * record of what the core asked for. One line, global, single-threaded. Declarations between the markers are read by
- * firmware/tests/native.py.
+ * @file native.h  The protocol core as a native library for tests: a flat interface for cffi (ABI mode), and the port
+ * as a record of what the core asked for. One line, global, single-threaded. Declarations between the markers are read
+ * by firmware/tests/native.py.
  */
 #ifndef FW_NATIVE_H
 #define FW_NATIVE_H
@@ -45,7 +45,7 @@ void fw_tick(uint32_t us);
 void fw_power(int apf);
 int fw_batch_done(const fw_result *results, unsigned n);
 int fw_cycle_done(fw_result management, fw_result inclusion, const uint32_t in[8]);
-int fw_slave_lost(unsigned index);
+int fw_slave_lost(const uint32_t lost[2]);
 void fw_set_mode(int protected_mode);
 void fw_set_offline(int offline);
 void fw_set_data_exchange(int active);

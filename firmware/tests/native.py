@@ -15,14 +15,14 @@ WARNINGS = ["-std=c17", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror
 
 
 def compile_native(target: Path, sources, flags) -> Path:
-    """cc -> target, under a lock-free unique name first, so that parallel test workers do not meet; raises on failure."""
+    """cc -> target, by way of a unique name, so that parallel test workers do not meet; raises on failure."""
     target.parent.mkdir(parents=True, exist_ok=True)
     headers = [p for d in ("core", "generated", "tests") for p in (ROOT / "firmware" / d).glob("*.h")]
     newest = max(p.stat().st_mtime for p in [*sources, *headers])
     if not target.exists() or target.stat().st_mtime < newest:
         part = target.with_suffix(f".{os.getpid()}")
-        subprocess.run([os.environ.get("CC", "cc"), *WARNINGS, *INCLUDES, "-g", *flags, *map(str, sources), "-o", str(part)],
-                       check=True, cwd=target.parent)
+        subprocess.run([os.environ.get("CC", "cc"), *WARNINGS, *INCLUDES, "-g", *flags, *map(str, sources),
+                        "-o", str(part)], check=True, cwd=target.parent)
         os.replace(part, target)
     return target
 
@@ -33,8 +33,8 @@ def load():
     ffi = cffi.FFI()
     text = (ROOT / "firmware/tests/native.h").read_text()
     ffi.cdef(text.split("/* cffi begin */")[1].split("/* cffi end */")[0])
-    flags = ["-O1", "-fPIC", "-shared", "-fsanitize=undefined", "-fno-sanitize-recover=all"]
-    if os.environ.get("FW_COVERAGE") == "1":
-        flags += ["--coverage"]
-    name = "libasi_cov.so" if "--coverage" in flags else "libasi.so"
+    if os.environ.get("FW_COVERAGE") == "1":  # without the sanitizer, whose branches are never taken
+        name, flags = "libasi_cov.so", ["-O0", "-fPIC", "-shared", "--coverage"]
+    else:
+        name, flags = "libasi.so", ["-O1", "-fPIC", "-shared", "-fsanitize=undefined", "-fno-sanitize-recover=all"]
     return ffi, ffi.dlopen(str(compile_native(BUILD / name, SOURCES, flags)))

@@ -43,8 +43,8 @@ def test_worked_words():
     """CA-003: the words printed in the specification notes, E1 .. E11 (14-bit request = payload, parity, end bit)."""
     def word(payload):
         return payload << 2 | (payload.bit_count() & 1) << 1 | 1
-    assert [word(call("DEXG", 5, 0b1010)), word(call("WPAR", 12, 6)), word(call("ADRA", data=7)), word(call("BR01"))] == [
-        0x02A9, 0x065B, 0x001F, 0x1FD7]
+    calls = [call("DEXG", 5, 0b1010), call("WPAR", 12, 6), call("ADRA", data=7), call("BR01")]
+    assert [word(c) for c in calls] == [0x02A9, 0x065B, 0x001F, 0x1FD7]
     assert [word(call(n, 5)) for n in COMMANDS] == [0x1283, 0x12F1, 0x12C1, 0x12C7, 0x12CB, 0x12CD, 0x12FB]
     assert [word(call(n, 37)) for n in COMMANDS] == [0x12A1, 0x12D3, 0x12E3, 0x12E5, 0x12E9, 0x12EF, 0x12D9]
 

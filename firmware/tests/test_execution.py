@@ -373,6 +373,7 @@ def test_miss_counter_starts_over():
     for _ in range(4):
         m.slaves[1].present = False
         m.cycles(2 * 62)
+        assert m.read()["lds"] == {0, 1}
         m.slaves[1].present = True
         m.cycles(62 + 3)
         assert m.read()["lds"] == {0, 1}
@@ -388,7 +389,7 @@ def test_lost_slave():
     s = m.read()
     assert s["las"] == s["lds"] == {1, 4} and s["cdi"][36] == 0xFFFF and s["in"][36] == 0 and not m.port.active[36]
     assert s["in"][4] == 9 and 36 in s["changed"]
-    assert m.lib.fw_slave_lost(36) == BAD_STATE
+    assert m.lose([36]) == BAD_STATE
     m.slaves[2].power_up()
     m.slaves[2].present = True
     m.rounds()
@@ -413,8 +414,8 @@ def test_config_ok():
     """EX-016: in both modes; missing, extra and wrong slave and slave 0 each clear it."""
     one, two = std(1), ab(34)
     for protected in (False, True):
-        for present, ok in (([one, two], True), ([one], False), ([one, two, std(3)], False), ([one, ab(34, io=1)], False),
-                            ([one, ab(34, id1=3)], False), ([one, two, std(0)], False)):
+        for present, ok in (([one, two], True), ([one], False), ([one, two, std(3)], False),
+                            ([one, ab(34, io=1)], False), ([one, ab(34, id1=3)], False), ([one, two, std(0)], False)):
             m = Master([Slave(**{**vars(s), "heard": s.heard.copy()}) for s in present], projected=[one, two])
             m.protect(protected)
             m.start()
@@ -506,6 +507,7 @@ def test_outputs():
     m.host_outputs[1], m.host_outputs[2], m.host_outputs[34] = 0b0110, 0b1101, 0b0011
     m.start().cycles(3)
     assert [s.outputs for s in m.slaves] == [0b1001, 0b010, 0b100]
+    assert m.port.out[0] >> 8 & 15 == 0b1010  # bit 3 is no payload: not inverted
     assert m.port.out[0] >> 12 == 0xFFFFF and list(m.port.out)[5:] == [0xFFFFFFFF] * 3
     m.set_data_exchange(False)
     m.cycles(3)
@@ -539,7 +541,7 @@ def test_refused_functions_change_nothing():
     assert m.lib.fw_set_projection(lps, pcd, [*pp[:63], 16]) == BAD_ARG
     for name in ("ADRA", "WID1", "DELA", "BR01", "PRGM", "R1", "DEXG"):
         assert m.lib.fw_manage(encode_call(name, 1, 5)) == BAD_ARG, name
-    assert m.lib.fw_slave_lost(2) == m.lib.fw_slave_lost(64) == BAD_STATE
+    assert m.lose([2, 0, 32]) == m.lose([]) == BAD_STATE
     assert m.lib.fw_batch_done([(0, 0, 0)], 1) == BAD_STATE
     assert m.read() == before and m.port.managements == 0
     m.set_offline(True)
@@ -563,8 +565,8 @@ def test_management_aborted():
 
 @pytest.mark.parametrize("b_first", [True, False])
 def test_clash(b_first):
-    """EX-026: a standard slave and a B slave on one number: both detected, the standard one active, Config_OK clear even
-    when both are projected; when the standard slave goes the B slave is activated."""
+    """EX-026: a standard slave and a B slave on one number: both detected, the standard one active, Config_OK clear
+    even when both are projected; when the standard slave goes the B slave is activated."""
     standard, b = std(5), ab(37, inputs=3)
     m = Master([standard, b, std(9)], projected=[standard, b, std(9)])
     (standard if b_first else b).present = False

@@ -20,7 +20,7 @@ def slaves(draw):
 
 
 class Line(RuleBasedStateMachine):
-    """EX-001, EX-008, EX-009, EX-015 .. EX-021, EX-023, EX-025, EX-026, CA-003, CA-006: invariants under any history."""
+    """EX-001, EX-008, EX-009, EX-015 .. EX-021, EX-023, EX-025, EX-026, CA-003, CA-006: what always holds."""
 
     @initialize(first=st.lists(slaves(), max_size=4, unique_by=lambda s: s.index))
     def power_up(self, first):
@@ -83,7 +83,8 @@ class Line(RuleBasedStateMachine):
     def auto_address(self, on):
         self.m.set_auto_address(on)
 
-    @rule(some=st.lists(slaves().filter(lambda s: s.index), max_size=3, unique_by=lambda s: s.index), real=st.booleans())
+    @rule(some=st.lists(slaves().filter(lambda s: s.index), max_size=3, unique_by=lambda s: s.index),
+          real=st.booleans())
     def project(self, some, real):
         self.m.project([s for s in self.m.slaves if s.index] if real else some)
 
@@ -135,7 +136,8 @@ class Line(RuleBasedStateMachine):
         shown = {k: s[k] for k in ("phase", "flags", "lds", "las", "lpf", "cdi", "pi", "pecho")}
         if self.shown is not None and shown != self.shown:  # what the window copies only on a new version
             assert s["version"] != self.version
-            assert all(i in s["changed"] for i in range(64) for k in ("cdi", "pi", "pecho") if shown[k][i] != self.shown[k][i])
+            for k in ("cdi", "pi", "pecho"):
+                assert all(i in s["changed"] for i in range(64) if shown[k][i] != self.shown[k][i])
             m.lib.fw_changes_taken()
         self.shown, self.version = shown, s["version"]
 
