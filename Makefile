@@ -79,11 +79,10 @@ test: $(VENV)/.ready  ## everything, with one closing line of counts; JUnit and 
 # ---------------------------------------------------------------- run
 PLANT ?= sim/plants/packaging.toml
 RUN_LIB = $(BUILD)/tb/libasi_chip$(if $(filter 1,$(WAVES)),_trace).so
-RUN_FW  = $(BUILD)/firmware/asi$(if $(filter 1,$(QUICK)),_test).hex
 .PHONY: run
-run: $(VENV)/.ready $(RUN_LIB) $(RUN_FW)  ## run a plant: make run PLANT=... TIME=1200ms WAVES=1 QUICK=1
+run: $(VENV)/.ready $(RUN_LIB) $(BUILD)/firmware/asi.hex $(BUILD)/firmware/asi_test.hex  ## run a plant: make run PLANT=... TIME=500ms WAVES=1 QUICK=0
 	@$(VPY) -m asi run $(PLANT) $(if $(TIME),--time $(TIME)) $(if $(filter 1,$(WAVES)),--waves) \
-	  $(if $(filter 1,$(QUICK)),--quick) $(RUN_ARGS)
+	  $(if $(filter 1,$(QUICK)),--quick) $(if $(filter 0,$(QUICK)),--no-quick) $(RUN_ARGS)
 
 # ---------------------------------------------------------------- requirement matrix, waveform view
 .PHONY: matrix

@@ -23,6 +23,7 @@ EXIT_CODES = {"ok": OK, "expectation not met": NOT_MET, "failed": FAILED, "inter
 
 FIRMWARE = Path("build/firmware")
 QUICK_SETTLE_NS = 20_000_000  # P_PWR_SETTLE of asi_test.hex
+SHORTEST_LOOK_NS = 100_000_000  # a run that ends this soon after the settle time shows little of the network
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="Tools of the open AS-Interface master.")
@@ -102,8 +103,10 @@ def run(
     log: Annotated[bool, typer.Option(help="Write telegrams.log and telegrams.jsonl.")] = True,
     seed: Annotated[int | None, typer.Option(
         min=0, max=2**63 - 1, show_default=False, help="Random seed of the faults; default: the plant's.")] = None,
-    quick: Annotated[bool, typer.Option(
-        "--quick", help="Test firmware: waits 20 ms instead of 1 s after power-up; the plant's times move.")] = False,
+    quick: Annotated[bool | None, typer.Option(
+        "--quick/--no-quick", show_default=False,
+        help="Test firmware: waits 20 ms instead of 1 s after power-up; the plant's times move. "
+             "Default: quick with --waves and where --time would end in the quiet second.")] = None,
     firmware: Annotated[Path | None, typer.Option(
         show_default=False, help="Another firmware image; say its settle time with --settle.")] = None,
     settle: Annotated[int | None, typer.Option(
@@ -111,6 +114,9 @@ def run(
 ) -> None:
     """Run a plant on the simulated master and report what happened."""
     described = _load(plant)
+    chosen = quick is not None
+    if quick is None:
+        quick = firmware is None and (waves or (time is not None and time < SETTLE_NS + SHORTEST_LOOK_NS))
     settle_ns = settle if settle is not None else QUICK_SETTLE_NS if quick else SETTLE_NS
     described = described.with_settle(settle_ns)
     if seed is not None:
@@ -126,6 +132,8 @@ def run(
     if not console.is_terminal:
         console = Console(highlight=False, width=120)  # a file or a pipe has no width of its own
     console.print(Text(" ".join(described.description.split()), style="dim"))
+    if quick and not chosen:
+        console.print("note: the wait after power-up is 20 ms instead of 1 s in this run (--no-quick, QUICK=0 keeps it)")
     if until_ns <= settle_ns:
         console.print(f"note: the line stays quiet until {report.us(settle_ns)}, the wait after power-up")
     wave_path = out / "waves.part" if waves else None
