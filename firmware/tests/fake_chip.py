@@ -34,9 +34,8 @@ def load():
         part.mkdir(parents=True, exist_ok=True)
         subprocess.run(["verilator", "--cc", "--exe", "--build", "-j", "1", "-O3", "--x-assign", "fast", "-Wno-fatal",
                         "-Wno-lint", "--top-module", "VexRiscv", "--prefix", "VVexRiscv", "--Mdir", str(part),
-                        "-o", "libfwsoc.so", "-CFLAGS", f"-fPIC -O2 -I{ROOT}/firmware/generated", "-LDFLAGS", "-shared", core,
-                        str(sources[0])],
-                       check=True, stdout=subprocess.DEVNULL)
+                        "-o", "libfwsoc.so", "-CFLAGS", f"-fPIC -O2 -I{ROOT}/firmware/generated", "-LDFLAGS", "-shared",
+                        core, str(sources[0])], check=True, stdout=subprocess.DEVNULL)
         os.replace(part / "libfwsoc.so", library)
     return ffi, ffi.dlopen(str(library))
 
