@@ -16,7 +16,7 @@ module asi_trace
   input  logic [3:0]          res_data_i,
   input  phase_e              phase_i,
   output logic [8*Chars-1:0]  request_text_o, // "DEXG 17B 101", the last call taken
-  output logic [8*Chars-1:0]  answer_text_o,  // "0110" or the error class; "..." while the call is open
+  output logic [8*Chars-1:0]  answer_text_o,  // "0110" or the error class; stays until the next result, to be readable
   output logic [8*Chars-1:0]  phase_text_o,
   output logic [63:0][3:0]    outputs_o,      // last DEXG data per slave, line level
   output logic [63:0][3:0]    inputs_o        // last valid DEXG answer per slave
@@ -147,7 +147,6 @@ module asi_trace
     if (req_i) begin
       call_d    = decode(req_call_i, ext_d);
       request_d = {call_d.name, " ", call_d.address, " ", call_d.data};
-      answer_d  = "...           ";
       if (call_d.is_dexg) outputs_d[call_d.index] = req_call_i[3:0];
     end
   end
