@@ -100,7 +100,7 @@ module asi_seq_tb
       else if (busy) begin
         attempt <= attempt + 2'd1;  sent <= 1'b1;  again <= 1'b1;  left <= again_clocks_i;
       end
-      begun_count_o <= begun_count_o + 16'(u_dut.state_q == u_dut.StPace && u_dut.state_d == u_dut.StFetch);
+      begun_count_o <= begun_count_o + 16'(u_dut.begun);
       cycle_count_o <= cycle_count_o + 16'(cycle_done);
       batch_count_o <= batch_count_o + 16'(batch_done);
       lost_count_o  <= lost_count_o + 16'(slave_lost);

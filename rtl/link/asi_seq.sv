@@ -49,7 +49,8 @@ module asi_seq
   localparam logic [2:0] AddrImages = 3'(LinkOutImg >> 7);      // {AddrImages, in, copy, word}
   localparam logic [5:0] AddrExtra  = 6'(LinkMgmtReq >> 4);     // {AddrExtra, inclusion, result}
   localparam logic [5:0] AddrCount  = 6'(LinkSent >> 4);        // {AddrCount, counter}
-  localparam logic [1:0] AddrSlot = 2'(LinkSlot >> 8), AddrState = 2'(LinkSlotState >> 8), AddrBatch = 2'(LinkBatch >> 8);
+  localparam logic [1:0] AddrSlot  = 2'(LinkSlot >> 8), AddrState = 2'(LinkSlotState >> 8);  // {.., index}
+  localparam logic [1:0] AddrBatch = 2'(LinkBatch >> 8);
   localparam logic [1:0] CountSent = 2'd0, CountRepeated = 2'd1, CountFailed = 2'd2, CountCycles = 2'd3;
 
   typedef enum logic [1:0] {KindDexg, KindMgmt, KindIncl, KindBatch} kind_e;
@@ -329,7 +330,8 @@ module asi_seq
   assign batch_busy_o   = state_q != StIdle && is_batch;
   assign cycle_busy_o   = state_q != StIdle && !is_batch;
   assign sync_o         = sent_i && first_q && !repeat_i;
-  assign slot_phase_o   = kind_q == KindMgmt ? PhaseManagement : kind_q == KindIncl ? PhaseInclusion : PhaseDataExchange;
+  assign slot_phase_o   = kind_q == KindMgmt ? PhaseManagement :
+                          kind_q == KindIncl ? PhaseInclusion : PhaseDataExchange;
 
   always_ff @(posedge clk_i) begin
     state_q <= rst_i ? StIdle : state_d;
@@ -351,17 +353,20 @@ module asi_seq
   end
 
 `ifndef SYNTHESIS
-  // MaxOfferClocks: from a result that the sequencer waits for to the next offer, on the longest way (last DEXG, no extra
-  // call, publication). The shortest gap after a result is 48 clocks (P_GAP_NORSP at 8 MHz).
-  localparam int unsigned MaxOfferClocks = 36;
+  // MaxOfferClocks: from a result that the sequencer waits for to the next offer. 11 to the next DEXG, 33 from the last
+  // DEXG over publication to the next cycle, 37 if in those clocks the only slave is lost and firmware adds an extra
+  // request. The shortest gap after a result is 48 clocks (P_GAP_NORSP at 8 MHz).
+  localparam int unsigned MaxOfferClocks = 38;
   int unsigned since_q;
   logic        timed_q;
   logic [13:0] offered_q;  // the request may not change while it is offered
   logic        held_q;
+  logic        begun;      // a cycle begins; for the test bench
+  assign begun = state_q == StPace && state_d == StFetch;
   always_ff @(posedge clk_i) begin
     // ends with the offer, with a wait on purpose, and where a cycle without any telegram begins
     timed_q <= !rst_i && (timed_q ? !valid_q && state_q != StIdle && !(state_q == StPace && !paced_q) &&
-                                    !(state_q == StPick && !offer && snap_q)
+                                    !(state_q == StPick && !offer && first_q)
                                   : res_valid_i && state_q == StWait && !sent_q && !again_q);
     since_q <= timed_q ? since_q + 1 : 1;
     held_q    <= !rst_i && req_valid_o && !req_ready_i;
@@ -378,6 +383,7 @@ module asi_seq
       Atomic_A:   assert (state_q != StCopy || mem_req_o);  // no free clock for the core inside a copy
       Events_A:   assert (!(cycle_done_o && is_batch) && !(batch_done_o && !is_batch));
       Published_A: assert (!cycle_done_o || !open_q);
+      Begin_C:    cover (begun);
       Lost_C:     cover (slave_lost_o);
       OnlyLost_C: cover (state_q == StInWr && lost_q && cur_q == nxt_q && nxt_v_q);
       Alternate_C: cover (state_q == StPick && pend_q && !do_mgmt);
