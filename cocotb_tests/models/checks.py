@@ -29,24 +29,31 @@ def window(dt_ns):
 def classify(pulses, bits, quiet_ns=QUIET_NS):
     """[(ns from the first pulse, polarity)] -> (ErrorClass, word or None).
 
-    Pulses later than the length window are ignored. A bit is the polarity of the first pulse in its window; pulses
-    after the last window break the length, not the timing (E12: a pulse at 39 us), but must alternate like all others.
+    Three things the wording of the checks leaves open: a second pulse in one window is a timing error (it could flip a
+    bit); the telegram ends with the pulse in the last window, what follows is judged by length only; without such a
+    pulse a later one is a timing error. Pulses after the length window are ignored.
     """
     end = end_ns(bits)
-    pulses = [(dt, pol) for dt, pol in pulses if dt <= end + quiet_ns + WIN_LATE_NS]
+    # of two senders' opposite pulses at one instant the positive one counts as the first
+    pulses = sorted((p for p in pulses if p[0] <= end + quiet_ns + WIN_LATE_NS), key=lambda p: (p[0], -p[1]))
     values = {0: pulses[0][1]}
-    timing = length = False
+    seen = {0}
+    alternation = timing = length = False
+    previous = pulses[0][1]
     for dt, polarity in pulses[1:]:
-        n = window(dt)
-        if bits - 1 in values or dt > end + WIN_LATE_NS:
+        if bits - 1 in values:
             length = True
-        elif n is None:
-            timing = True
-        elif n % 2 == 0:
+            continue
+        n = window(dt)
+        alternation |= polarity == previous
+        timing |= n is None or n in seen or n > 2 * (bits - 1)
+        seen.add(n)
+        previous = polarity
+        if n is not None and n % 2 == 0 and n <= 2 * (bits - 1):
             values.setdefault(n // 2, polarity)
     if pulses[0][1] > 0:
         return ErrorClass.START, None
-    if any(a[1] == b[1] for a, b in zip(pulses, pulses[1:])):
+    if alternation:
         return ErrorClass.ALTERNATION, None
     if timing:
         return ErrorClass.TIMING, None
@@ -68,19 +75,20 @@ class RequestCollector:
         self.call = None
         self._values = [polarity]
         self._last = polarity
+        self._window = 0
         self._good = polarity < 0
 
     def add(self, t_ns, polarity):
         """The next pulse -> False when the request cannot be good any more."""
         n = window(t_ns - self.t0)
         bits = self._values
-        if not self.alive(t_ns) or polarity == self._last or n is None:
+        if not self.alive(t_ns) or polarity == self._last or n is None or n == self._window:
             self._good = False
         elif n % 2 == 0 and n // 2 == len(bits):
             bits.append(polarity)
             if len(bits) == REQUEST_BITS:
                 self._finish()
-        self._last = polarity
+        self._last, self._window = polarity, n
         return self._good
 
     def alive(self, t_ns):

@@ -28,7 +28,7 @@ class Line:
         self._queue = []
         self._order = count()
         self._listeners = []
-        self._busy_until = {-1: -1, 1: -1}
+        self.busy_until = {-1: -1, 1: -1}     # by polarity: end of the pulse on the wire
 
     def listen(self, listener):
         """listener(pulse) for every pulse on the wire, in the order of their starts."""
@@ -71,8 +71,8 @@ class Line:
 
     def _start(self, pulse):
         # two senders at once: equal polarities look like one pulse to a comparator, opposite ones are both seen
-        merged = pulse.t_ns < self._busy_until[pulse.polarity]
-        self._busy_until[pulse.polarity] = max(self._busy_until[pulse.polarity], pulse.t_ns + pulse.width_ns)
+        merged = pulse.t_ns <= self.busy_until[pulse.polarity]
+        self.busy_until[pulse.polarity] = max(self.busy_until[pulse.polarity], pulse.t_ns + pulse.width_ns)
         if not merged:
             for listener in self._listeners:
                 listener(pulse)
