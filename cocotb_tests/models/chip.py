@@ -2,7 +2,7 @@
 """The cocotb side: binds a Line to the line pins of a DUT, and drives the native host port.
 
 Nothing here runs per clock: one wake-up per edge of tx_man_o, one per start and end of a pulse, one per decision of
-the slaves. Times of the line are ns since the start of the simulation, exact down to half a nanosecond and below.
+the slaves. Times of the line are ns since the pins were coupled; fractions come from clocks whose period is not whole.
 """
 import cocotb
 from asi import regmap
@@ -19,12 +19,6 @@ MAGIC = 0x4D49_5341             # 'ASIM'
 PS = 1_000
 
 
-def now_ns():
-    """Time of the simulation in ns; a float only when it is not whole."""
-    whole, rest = divmod(get_sim_time("ps"), PS)
-    return int(whole) if not rest else whole + rest / PS
-
-
 class LinePins:
     """Couples tx_man_o, tx_en_o, rx_p_i, rx_n_i of a DUT with a Line, own pulses included, as on a real line.
 
@@ -34,11 +28,11 @@ class LinePins:
 
     def __init__(self, dut, line=None, sender=MASTER):
         self.dut, self.line, self.sender = dut, line or Line(), sender
+        self._origin_ps = int(get_sim_time("ps"))   # cocotb leaves a ps between tests: start a grid of our own
         self._pins = {-1: dut.rx_n_i, 1: dut.rx_p_i}
         self._last = {-1: -1, 1: -1}        # end of the pulse that is on the pin
         for pin in self._pins.values():
             pin.value = Immediate(0)
-        self.line.now = now_ns()
         self.line.on_earlier = self._earlier
         self.line.listen(self._show)
         self._work = Event()
@@ -46,12 +40,20 @@ class LinePins:
         self._pump_task = cocotb.start_soon(self._pump())
         cocotb.start_soon(self._transmit())
 
+    def _now_ps(self):
+        return int(get_sim_time("ps")) - self._origin_ps
+
+    def now(self):
+        """Time of the line in ns; a float only when it is not whole."""
+        whole, rest = divmod(self._now_ps(), PS)
+        return whole + rest / PS if rest else whole
+
     async def _transmit(self):
         man, enable, line = self.dut.tx_man_o, self.dut.tx_en_o, self.line
         while True:
             await man.value_change
             if int(enable.value):
-                now = now_ns()
+                now = self.now()
                 line.pulse(now, 1 if int(man.value) else -1, self.sender)
                 line.advance(now)
 
@@ -60,10 +62,10 @@ class LinePins:
         while True:
             while line.next_ns is not None:
                 self._target = line.next_ns
-                if (wait := self._target - now_ns()) > 0:
-                    await Timer(round(wait * PS), "ps")
-                self._target = None         # on_earlier needs nothing while the queue is being run
-                line.advance(now_ns())
+                if (wait_ps := round(self._target * PS) - self._now_ps()) > 0:
+                    await Timer(wait_ps, "ps")
+                target, self._target = self._target, None   # on_earlier needs nothing while the queue is being run
+                line.advance(max(target, self.now()))       # a fraction of a ns may be rounded
             self._work.clear()
             self._target = float("inf")
             await self._work.wait()
@@ -223,9 +225,9 @@ class HostWindow:
 
     async def until(self, condition, timeout_us, what="condition", step_us=500):
         """Look at await condition() every step_us until it holds; AssertionError after timeout_us of bus time."""
-        end = now_ns() + timeout_us * 1_000
+        end = get_sim_time("us") + timeout_us
         while not await condition():
-            assert now_ns() < end, f"{what}: not within {timeout_us} us"
+            assert get_sim_time("us") < end, f"{what}: not within {timeout_us} us"
             await Timer(step_us, "us")
 
 
@@ -254,13 +256,13 @@ class Chip:
 
     def supply(self, good):
         """Line voltage: pin apf_ni and the supply of the slaves."""
-        self.line.advance(now_ns())
+        self.line.advance(self.pins.now())
         self.dut.apf_ni.value = int(bool(good))
         self.net.power(good)
 
     def settle(self):
         """Bring monitor and slaves up to date; call it before looking at them."""
-        self.line.advance(now_ns())
+        self.line.advance(self.pins.now())
         self.net.settle()
         self.monitor.settle(self.line.now)
 

@@ -8,7 +8,7 @@ from asi.telegram import encode_call, pulses, request_pulses, response_word
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, RisingEdge, Timer
 
-from cocotb_tests.models.chip import MASTER, LinePins, now_ns
+from cocotb_tests.models.chip import MASTER, LinePins
 from cocotb_tests.models.monitor import Monitor
 from cocotb_tests.models.slaves import POWER_UP_NS, Slave, SlaveNetwork
 
@@ -98,12 +98,12 @@ async def receiver_agrees_with_the_monitor(dut):
         before = len(bench.monitor.telegrams)
         task = cocotb.start_soon(bench.call(call))
         await RisingEdge(dut.sent_o)
-        end = now_ns() + bench.period_ps / 1_000 + request[-1][0]
+        end = bench.pins.now() + bench.period_ps / 1_000 + request[-1][0]
         answer = sorted(dict(answer).items())       # opposite pulses at one instant have no order: leave them out
         bench.line.send(end + delay, [(t - answer[0][0], p) for t, p in answer], "slave")
         last, _, data, _ = await task
         await Timer(200, "us")      # what comes late belongs to no call
-        bench.monitor.settle(now_ns())
+        bench.monitor.settle(bench.pins.now())
         record = bench.monitor.telegrams[before]
         assert (record.error_class, record.call) == (last, call), f"{record.error_class!r} {last!r} {answer} {delay}"
         if last is ErrorClass.OK:
