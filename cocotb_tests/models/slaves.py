@@ -87,6 +87,7 @@ class Slave:
 
     def power_down(self, t_ns):
         """The supply goes; a running memory write is spoilt."""
+        self.update(t_ns)
         if self.present and t_ns < self._writing_until:
             self._memory = (0, self._memory[1])
             self._memory_ok = False
@@ -96,6 +97,8 @@ class Slave:
 
     def update(self, t_ns):
         """Let time-outs up to t_ns happen."""
+        if 0 <= self._writing_until <= t_ns:
+            self._memory_ok = True                  # S3 tells of the last write, and this one went well
         while self.watchdog and self.number and self.present:
             expiry = max(self._served_ns + WATCHDOG_NS, self._writing_until)
             if t_ns < expiry:

@@ -430,7 +430,7 @@ def test_address_assignment():
 
 
 def test_power_fail_while_writing():
-    """SL-005: power lost during the write: address 0, IO and ID read F, S3 = 1."""
+    """SL-005: power lost during the write: address 0, IO and ID read F, S3 = 1 until a write went well."""
     slave = Slave(0, io=3, id=0xA)
     bench = Bench(slave)
     bench.call("ADRA", data=7)
@@ -439,6 +439,10 @@ def test_power_fail_while_writing():
     bench.net.power(True)
     bench.wait(POWER_UP_NS)
     assert [bench.nibble(name) for name in ("RDIO", "RDID", "RDST")] == [15, 15, 8]
+    bench.call("ADRA", data=7)
+    assert bench.nibble("RDST", 7) == 9
+    bench.wait(WRITE_NS)
+    assert bench.nibble("RDST", 7) == 0
 
 
 def test_write_id1():
