@@ -6,6 +6,7 @@ the slaves. Times of the line are ns since the pins were coupled; fractions come
 """
 import cocotb
 from asi import regmap
+from asi.window import COUNTERS, State
 from cocotb.handle import Immediate
 from cocotb.triggers import Event, FallingEdge, RisingEdge, Timer
 from cocotb.utils import get_sim_time
@@ -176,6 +177,13 @@ class HostWindow:
         word = await self.read("FLAGS")
         return {name for name in self.FLAGS if word >> getattr(regmap, f"FLAGS_{name.upper()}_LSB") & 1}
 
+    async def state(self):
+        """Flags, phase, lists and counters as asi.window.State."""
+        set_flags = await self.flags()
+        lists = [frozenset(await self.indices(name)) for name in ("LDS", "LAS", "LPS", "LPF")]
+        return State({name: name in set_flags for name in self.FLAGS}, regmap.Phase(await self.read("PHASE")), *lists,
+                     {name: await self.read(name.upper()) for name in COUNTERS})
+
     async def inputs(self, tries=50):
         """The 64 input nibbles of one cycle; AssertionError when IN_SEQ never holds still (HW-003)."""
         for _ in range(tries):
@@ -247,11 +255,15 @@ class Chip:
         dut.spi_miso_i.value = 0
 
     async def reset(self, clocks=4):
-        """Reset for some clocks, then wait for the firmware to show itself (at most 50 ms)."""
+        """Reset for some clocks, then wait for the firmware to show itself (at most 50 ms).
+
+        A reset leaves the memories as they are: without a MAGIC of 0 the one of an earlier start would be taken for it.
+        """
         self.dut.rst_i.value = 1
         for _ in range(clocks):
             await RisingEdge(self.dut.clk_i)
         self.dut.rst_i.value = 0
+        await self.host.write("MAGIC", 0)
         await self.host.until(self.host.ready, 50_000, "MAGIC")
 
     def supply(self, good):
