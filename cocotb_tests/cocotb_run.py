@@ -9,15 +9,28 @@ import shutil
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from cocotb_tools.runner import get_runner
+from cocotb_tools.runner import Verilator, get_runner
 
 ROOT = Path(__file__).resolve().parent.parent
 RTL = ROOT / "rtl"
 PACKAGES = [RTL / "generated/asi_map_pkg.sv", RTL / "phy/asi_timing_pkg.sv"]
 
 
-def run_cocotb(top, sources, test_module, *, name=None, parameters=None, extra_args=(), env=None, plusargs=()):
-    """Build `top` from PACKAGES + sources (paths below rtl/ or absolute) and run test_module; AssertionError on failure."""
+class _Quick(Verilator):
+    """Keeps signals private unless a .vlt file names them: the simulation is about three times as fast."""
+
+    def _build_command(self):
+        commands = super()._build_command()
+        commands[0].remove("--public-flat-rw")
+        return commands
+
+
+def run_cocotb(top, sources, test_module, *, name=None, parameters=None, extra_args=(), env=None, plusargs=(),
+               quick=False):
+    """Build `top` from PACKAGES + sources (paths below rtl/ or absolute) and run test_module; AssertionError on failure.
+
+    quick: only the signals that a .vlt file among extra_args makes public are seen by the tests.
+    """
     name = name or "-".join([top, *(f"{k}{v}" for k, v in (parameters or {}).items())])
     build_dir = ROOT / "build/cocotb" / name
     waves = os.environ.get("WAVES") == "1"
@@ -25,7 +38,7 @@ def run_cocotb(top, sources, test_module, *, name=None, parameters=None, extra_a
     if os.environ.get("RTL_COVERAGE") == "1":
         args.append("--coverage-line")
     os.environ.setdefault("OBJCACHE", f"bash {ROOT / 'tools/objcache.sh'} {ROOT / 'build/objcache'}")
-    runner = get_runner("verilator")
+    runner = _Quick() if quick else get_runner("verilator")
     runner.build(sources=[*PACKAGES, *(p if Path(p).is_absolute() else RTL / p for p in map(Path, sources))],
                  hdl_toplevel=top, parameters=parameters or {}, build_args=args, build_dir=build_dir, waves=waves,
                  verbose=False)
