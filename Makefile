@@ -92,3 +92,12 @@ matrix: $(VENV)/.ready  ## docs/verification.md: which tests name which requirem
 .PHONY: views
 views: $(VENV)/.ready  ## regenerate sim/views/asi.gtkw
 	@$(VPY) tools/gtkw.py
+
+# ---------------------------------------------------------------- figures
+.PHONY: figures
+figures: $(BUILD)/tb/libasi_chip.so firmware synth  ## measure the published figures: README table and build/figures.json (minutes)
+	@$(VPY) tools/figures.py
+
+.PHONY: screenshot
+screenshot:  ## docs/images/waves.png from build/run/waves.fst (needs gtkwave, Xvfb, ImageMagick)
+	@bash tools/screenshot.sh $(BUILD)/run/waves.fst docs/images/waves.png 100000000 100620000

@@ -4,6 +4,7 @@
 Exit codes: 0 everything as the plant expects, 1 an expectation was not met, 2 bad input (plant, option),
 3 the simulation failed, 130 stopped by Ctrl-C (the report so far is written).
 """
+import time as clock
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -54,7 +55,7 @@ class _Lines:
     """Progress without a terminal: one line per tenth of the run."""
 
     def __init__(self, console: Console):
-        self.console, self.tenth = console, 0
+        self.console, self.tenth, self.started = console, 0, clock.monotonic()
 
     def __enter__(self) -> "_Lines":
         return self
@@ -62,15 +63,16 @@ class _Lines:
     def __exit__(self, *exc: object) -> None:
         pass
 
-    def __call__(self, now: int, end: int, cycle_max_ns: int) -> None:
+    def __call__(self, now: int, end: int, cycles: int) -> None:
         tenth = min(10, 10 * now // max(end, 1))
         if tenth > self.tenth:
             self.tenth = tenth
-            self.console.print(f"{now / 1e6:.0f} of {end / 1e6:.0f} ms", highlight=False)
+            ratio = now / 1e9 / max(clock.monotonic() - self.started, 1e-6)
+            self.console.print(f"{now / 1e6:.0f} of {end / 1e6:.0f} ms  {cycles} cycles  {ratio:.2f} x real time")
 
 
 class _Bar:
-    """Progress on a terminal: bus time, longest cycle so far, ratio to real time."""
+    """Progress on a terminal: bus time, cycles, ratio to real time."""
 
     def __init__(self, console: Console):
         self.bar = Progress(TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"),
@@ -84,12 +86,11 @@ class _Bar:
     def __exit__(self, *exc: object) -> None:
         self.bar.__exit__(*exc)
 
-    def __call__(self, now: int, end: int, cycle_max_ns: int) -> None:
+    def __call__(self, now: int, end: int, cycles: int) -> None:
         spent = self.bar.tasks[0].elapsed or 0.0
         ratio = f"{now / 1e9 / spent:.2f} x real time" if spent > 0.1 else ""
-        cycle = f"longest cycle {report.us(cycle_max_ns)}" if cycle_max_ns else "no cycle yet"
         self.bar.update(self.task, completed=now, total=end, description=f"{now / 1e6:.0f} of {end / 1e6:.0f} ms",
-                        note=f"{cycle}  {ratio}")
+                        note=f"{cycles} cycles  {ratio}")
 
 
 @app.command()

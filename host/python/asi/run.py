@@ -73,13 +73,13 @@ def compare(check: Check, state: State, inputs: list[int] | None, cycle_max_ns: 
 
 
 class Runner:
-    """One run. `progress` is called after each step with (bus time, end, longest cycle so far in ns)."""
+    """One run. `progress` is called after each step with (bus time in ns, end in ns, cycles so far)."""
 
     def __init__(self, plant: Plant, bench: Bench, folder: Path, until_ns: int | None = None, *, log: bool = True,
                  progress: Callable[[int, int, int], None] | None = None):
         self.plant, self.bench, self.folder = plant, bench, folder
         self.until_ns = plant.duration_ns if until_ns is None else until_ns
-        self.progress = progress or (lambda now, end, cycle: None)
+        self.progress = progress or (lambda now, end, cycles: None)
         self.window = HostWindow(bench)
         self.configured = False
         self.version: str | None = None
@@ -134,7 +134,7 @@ class Runner:
             log.add(self.bench.telegrams())
             while self._checks and self._checks[0].time_ns <= now:  # before what happens at the same time
                 self._check(self._checks.popleft())
-            self.progress(now, self.until_ns, self.bench.stats().cycle_max_ns)
+            self.progress(now, self.until_ns, self.bench.stats().cycles)
 
     def _check(self, check: Check) -> None:
         state = self.window.state()
