@@ -50,7 +50,7 @@ lint: $(VENV)/.ready  ## Verilator -Wall over the whole chip, three parameter se
 	  -F $(CURDIR)/rtl/asi_master.f $(VEXRISCV) $(CURDIR)/syn/serial_host.sv $(CURDIR)/syn/top.sv
 
 .PHONY: synth
-synth: $(VENV)/.synth  ## cells and clock rate on iCE40 UP5K and ECP5-25F (minutes), table and build/synth/numbers.json
+synth: $(VENV)/.synth $(BUILD)/firmware/boot.hex  ## cells and MHz on UP5K and ECP5 (minutes); build/synth/numbers.json
 	@$(VPY) syn/synth.py --vexriscv $(VEXRISCV) --out $(BUILD)/synth $(ARGS)
 
 # ---------------------------------------------------------------- firmware
@@ -71,7 +71,7 @@ pytest: $(VENV)/.ready  ## run some tests: make pytest ARGS='cocotb_tests/block 
 
 # ---------------------------------------------------------------- test
 .PHONY: test
-test: $(BUILD)/tb/libasi_chip.so $(BUILD)/firmware/asi_test.hex
+test: $(BUILD)/tb/libasi_chip.so $(BUILD)/firmware/asi_test.hex $(BUILD)/firmware/boot.hex
 test: $(VENV)/.ready  ## everything, with one closing line of counts; JUnit and coverage in build/test
 	@rm -rf $(BUILD)/coverage-*.dat $(BUILD)/firmware/coverage && mkdir -p $(BUILD)/test
 	@RTL_COVERAGE=1 $(VPY) -m pytest -n 2 --dist loadfile --junitxml=$(BUILD)/test/junit.xml

@@ -7,7 +7,6 @@ misses the clock rate of the default configuration (16 MHz).
 """
 import argparse
 import json
-import random
 import shutil
 import subprocess
 import sys
@@ -77,8 +76,8 @@ def part_numbers(key, out, vexriscv, boot_rom):
         parameters["BootRomHex"] = f'"{boot_rom}"'
     stat = synthesise(key, "top", out, [*files, "syn/serial_host.sv", "syn/top.sv"], parameters, part["synth"])
     report = f"{out}/{key}-report.json"
-    run([*part["place"], "--freq", str(CLK_MHZ), "--timing-allow-fail", "--seed", "1", "--json", f"{out}/{key}-top.json",
-         "--report", report], f"{out}/{key}-place.log")
+    run([*part["place"], "--freq", str(CLK_MHZ), "--timing-allow-fail", "--seed", "1",
+         "--json", f"{out}/{key}-top.json", "--report", report], f"{out}/{key}-place.log")
     placed = json.loads(Path(report).read_text())
     fmax = min(clock["achieved"] for clock in placed["fmax"].values())
     used = placed["utilization"][part["used"]]
@@ -110,15 +109,11 @@ def main():
     out.mkdir(parents=True, exist_ok=True)
     vexriscv = f"{args.out}/VexRiscv_Min.v"          # the tools see only files below the present folder
     shutil.copy(args.vexriscv, vexriscv)
-    boot_rom = args.boot_rom
-    if not Path(boot_rom).exists() and any(PARTS[key]["boot_rom"] for key in args.part or PARTS):
-        boot_rom = f"{args.out}/filler.hex"          # an empty ROM would be optimised away
-        rng = random.Random(1)
-        Path(boot_rom).write_text("".join(f"{rng.getrandbits(32):08x}\n" for _ in range(256)))
-        print(f"{args.boot_rom} is not there: the boot ROM gets filler words, the numbers are the same")
+    if not Path(args.boot_rom).exists():             # an empty ROM would be optimised away
+        raise SystemExit(f"{args.boot_rom} is not there: make firmware")
     result = {"tools": {tool: version(tool) for tool in TOOLS}, "configurations": {}}
     for key in args.part or PARTS:
-        result["configurations"][key] = part_numbers(key, args.out, vexriscv, boot_rom)
+        result["configurations"][key] = part_numbers(key, args.out, vexriscv, args.boot_rom)
     if args.blocks:
         result["blocks_up5k"] = block_numbers(args.out, vexriscv)
     (out / "numbers.json").write_text(json.dumps(result, indent=2) + "\n")

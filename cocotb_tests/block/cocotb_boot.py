@@ -86,7 +86,7 @@ async def from_flash(dut):
 
 @cocotb.test(timeout_time=500, timeout_unit="ms")
 async def damaged_flash(dut):
-    """HW-007: an image with one wrong bit, in header, sums or program, is not started; a good one is, on the next try."""
+    """HW-007: an image with one wrong bit, in header, sums or program, is not started; a good one is, next try."""
     content = image()
     tb = BootTB(dut)
     flash = Flash(dut, FLASH_OFFSET, content)

@@ -123,7 +123,7 @@ async def batch_on_the_line(dut):
 
 @cocotb.test(timeout_time=50, timeout_unit="ms")
 async def cycle_on_the_line(dut):
-    """LK-001, LK-007, LK-012, LK-014: a cycle calls the active slots, publishes the inputs, keeps its period; sync and phase."""
+    """LK-001, LK-007, LK-012, LK-014: a cycle calls the active slots, publishes inputs, keeps its period."""
     tb = MasterTB(dut)
     await tb.power_up()
     for word in range(0x200, 0x3A0, 4):                            # no extra requests, images and counters 0

@@ -193,7 +193,7 @@ async def registers(dut):
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
 async def events(dut):
-    """LK-007, HW-002, EX-021: every event is sticky, cleared one by one, and not lost in the clock of a clearing write."""
+    """LK-007, HW-002, EX-021: events are sticky, cleared one by one, and not lost in the clock of a clearing write."""
     tb = TB(dut)
     await tb.start()
     await tb.poke(reg("EVENT"), 0x3F)

@@ -29,7 +29,8 @@ def build(source, base, out):
     out = Path(out)
     out.parent.mkdir(parents=True, exist_ok=True)
     script, elf = out.with_suffix(".ld"), out.with_suffix(".elf")
-    script.write_text(f"ENTRY(_start) PHDRS {{ code PT_LOAD; }} SECTIONS {{ . = {base:#x}; .text : {{ KEEP(*(.start)) *(.text*) *(.rodata*) *(.srodata*) }} :code"
+    script.write_text(f"ENTRY(_start) PHDRS {{ code PT_LOAD; }} SECTIONS {{ . = {base:#x};"
+                      " .text : { KEEP(*(.start)) *(.text*) *(.rodata*) *(.srodata*) } :code"
                       " /DISCARD/ : { *(.eh_frame*) *(.comment) } }\n")
     subprocess.run([sys.executable, "-m", "ziglang", "cc", *FLAGS, "-T", str(script), "-o", str(elf), str(source)],
                    check=True)

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // asi_fabric: both core buses to the memory map of docs/architecture.md. Knows addresses, no meaning.
-// RAM and boot ROM are shared by both sides, data first. An access to nothing answers at once with 0; a write there is
-// lost. (Reading one instruction ahead was tried: 2 to 4 % less clocks, as the core's pipeline rarely takes one a clock.)
+// RAM and boot ROM are shared by both sides, data first.
+// An access to nothing answers at once with 0; a write there is lost.
+// (Reading one instruction ahead was tried: only 2 to 4 % less clocks, the core's pipeline rarely takes one a clock.)
 module asi_fabric #(
   parameter int unsigned RamWords      = 16384,
   parameter bit          BootFromFlash = 1'b0,           // 0: there is no boot ROM

@@ -181,7 +181,7 @@ module asi_soc #(
   logic go_q;
   always_ff @(posedge clk_i) go_q <= !rst_i && regs_go;
   always_ff @(posedge clk_i) if (!rst_i) begin
-    NoStall_A: assert (!(stall_rd || stall_wr || rd_err || wr_err));        // one clock per access: asi_fabric relies on it
+    NoStall_A: assert (!(stall_rd || stall_wr || rd_err || wr_err));   // regs_ready relies on it
     Apart_A:   assert (!(regs_go && go_q));                                 // a cleared event is gone when WAIT is read
     Ack_A:     assert (regs_go == (rd_ack || wr_ack));
     Wait_C:    cover (core_wait_o);
