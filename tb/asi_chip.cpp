@@ -97,7 +97,8 @@ private:
     uint64_t p_until_ = kNoClock, n_until_ = kNoClock;  // clock at which the comparator output falls
     uint64_t phase_since_ = 0, phase_clocks_[8] = {};
     uint64_t cycle_at_ = kNoClock, cycles_ = 0, periods_ = 0, cycle_min_ = kNoClock, cycle_max_ = 0, cycle_sum_ = 0;
-    uint64_t busy_since_ = kNoClock, irq_count_ = 0, irq_max_ = 0;
+    uint64_t busy_since_ = kNoClock, irq_count_ = 0, irq_max_ = 0, irq_max_cycle_ = 0;
+    bool busy_in_cycle_ = false;  // cycles were running when the core woke
 #if VM_TRACE
     std::unique_ptr<WaveFile> wave_;
 #endif
@@ -210,9 +211,12 @@ void asi_chip::outputs_changed(const Watched &next) {
     if (next.wait != seen_.wait) {
         if (!next.wait) {
             busy_since_ = clock;
+            busy_in_cycle_ = next.phase >= kFirstCyclePhase;
         } else if (busy_since_ != kNoClock) {  // the start-up code before the first WAIT is not an interrupt
             irq_count_++;
             irq_max_ = std::max(irq_max_, clock - busy_since_);
+            if (busy_in_cycle_ && next.phase >= kFirstCyclePhase)
+                irq_max_cycle_ = std::max(irq_max_cycle_, clock - busy_since_);
         }
     }
     seen_ = next;
@@ -280,6 +284,7 @@ void asi_chip::get_stats(asi_chip_stats &out) {
     out.cycle_sum_ns = ns(cycle_sum_);
     out.irq_count = irq_count_;
     out.irq_clocks_max = irq_max_;
+    out.irq_clocks_max_cycle = irq_max_cycle_;
 }
 
 extern "C" {

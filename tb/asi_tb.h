@@ -74,6 +74,7 @@ typedef struct {
     uint64_t cycles, cycle_periods;        /* sync_o pulses; periods between two of them without a phase < 3 between */
     int64_t  cycle_min_ns, cycle_max_ns, cycle_sum_ns;      /* of these periods */
     uint64_t irq_count, irq_clocks_max;    /* core busy between leaving and re-entering WAIT, worst case */
+    uint64_t irq_clocks_max_cycle;         /* the same while cycles run */
 } asi_chip_stats;
 
 /* firmware_path: RAM image as $readmemh text, wave_path: NULL = no waves (only the library built with tracing can);

@@ -10,6 +10,7 @@ import argparse
 import importlib.metadata as metadata
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -54,8 +55,9 @@ def line_figures():
              ms(report["start"]["start_up_ns"]), command),
             (f"speed_{name}", f"Simulated per wall second, `make run`, {label}",
              f"{report['run']['real_time_ratio']:.2f} of real time", command),
-            (f"irq_{name}", f"Core busy between two sleeps, worst case, {label}",
-             f"{report['core']['longest_busy_clocks']} clocks", command),
+            (f"irq_{name}", f"Cycle work of the core, worst case, {label} (budget: half a cycle)",
+             f"{report['core']['longest_busy_in_cycle_clocks']} of "
+             f"{cycles['mean_ns'] * report['run']['clk_hz'] // 2 // 10**9} clocks", command),
         ]
     return rows
 
@@ -72,14 +74,21 @@ def cocotb_figure():
 
 
 def firmware_figures():
-    size = json.loads((BUILD / "firmware/size.json").read_text())
-    return [("firmware", "Firmware: code and constants / data and zeroed",
-             f"{size['text'] + size['rodata']} / {size['data'] + size['bss']} bytes", "make firmware")]
+    rows = []
+    for image, label in (("asi", "Firmware: image, and memory with data (stack apart)"), ("boot", "Boot ROM program")):
+        done = subprocess.run([sys.executable, "tools/elf2hex.py", f"build/firmware/{image}.elf", "--hex",
+                               str(BUILD / f"figures/{image}.hex")], cwd=ROOT, capture_output=True, text=True, check=True)
+        loaded, memory = re.search(r"(\d+) bytes loaded .* (\d+) bytes of memory", done.stdout).groups()
+        rows.append((f"firmware_{image}", label, f"{loaded} / {memory} bytes", "make firmware"))
+    return rows
 
 
 def synthesis_figures():
     numbers = json.loads((BUILD / "synth/numbers.json").read_text())
-    return [(f"synth_{row['board']}", f"Whole chip on {row['part']}", row["text"], "make synth") for row in numbers["rows"]]
+    return [(f"synth_{key}", f"Whole chip on {row['part']}",
+             f"{row['cells']} of {row['cells_available']} cells ({row['lut4']} LUT4, {row['ff']} FF, {row['bram']} BRAM, "
+             f"{row['spram']} SPRAM), {row['fmax_mhz']} MHz", "make synth")
+            for key, row in numbers["configurations"].items()]
 
 
 def versions():

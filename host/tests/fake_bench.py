@@ -53,7 +53,7 @@ class FakeBench:
         return SimpleNamespace(
             clocks=self.now * 16 // 1000, cycles=self.cycles, cycle_periods=len(times),
             cycle_min_ns=min(times, default=0), cycle_max_ns=max(times, default=0),
-            cycle_sum_ns=sum(times), irq_count=self.cycles, irq_clocks_max=1234,
+            cycle_sum_ns=sum(times), irq_count=self.cycles, irq_clocks_max=1234, irq_clocks_max_cycle=234,
             phase_ns=[self.settle_ns, 0, 0, sum(times), 0, 0, 0, 0])
 
     def add(self, slave):

@@ -372,7 +372,7 @@ def test_exit_0(asi, tmp_path):
     code, out, err = asi("run", PACKAGING, "--quick")
     assert code == 0 and err == ""
     assert "expect at 520.000 ms: met" in out and "\x1b" not in out
-    assert [line for line in out.splitlines() if re.fullmatch(r"\d+ of 520 ms", line)][-1].endswith("of 520 ms")
+    assert [line for line in out.splitlines() if re.fullmatch(r"\d+ of 520 ms  \d+ cycles  [\d.]+ x real time", line)]
     assert sorted(p.name for p in (tmp_path / "run").iterdir()) == ["report.json", "telegrams.jsonl", "telegrams.log"]
     assert asi.made == [(Path("build/firmware/asi_test.hex"), None, 7)] and asi.bench.closed
 
@@ -432,7 +432,8 @@ def test_options(asi, tmp_path):
     result = json.loads((tmp_path / "run/report.json").read_text())
     assert result["plant"]["seed"] == 99 and result["run"]["wanted_ns"] == 60_000_000
     assert result["checks"][0]["result"] == "not reached"
-    assert "note: the line stays quiet until 1000.000 ms" in asi("run", written(tmp_path), "--time", "500ms")[1]
+    assert "note: the line stays quiet until 1000.000 ms" in asi("run", written(tmp_path), "--time", "500ms", "--no-quick")[1]
+    assert "20 ms instead of 1 s" in asi("run", written(tmp_path), "--time", "500ms")[1]
 
 
 def test_check_command(asi, tmp_path):

@@ -64,6 +64,7 @@ class Stats(NamedTuple):
     cycle_sum_ns: int
     irq_count: int
     irq_clocks_max: int
+    irq_clocks_max_cycle: int
 
     @property
     def cycle_mean_ns(self):
@@ -237,4 +238,5 @@ class Chip:
         s = self._ffi.new("asi_chip_stats *")
         self._lib.asi_chip_get_stats(self._chip, s)
         return Stats(s.clocks, s.telegrams, s.repeated, s.failed, tuple(s.phase_ns), s.cycles, s.cycle_periods,
-                     s.cycle_min_ns, s.cycle_max_ns, s.cycle_sum_ns, s.irq_count, s.irq_clocks_max)
+                     s.cycle_min_ns, s.cycle_max_ns, s.cycle_sum_ns, s.irq_count, s.irq_clocks_max,
+                     s.irq_clocks_max_cycle)

@@ -67,7 +67,8 @@ def build(runner: "Runner", counts: Counts, *, wall_s: float, interrupted: bool,
             "by_call": dict(sorted(counts.by_call.items())), "by_class": dict(sorted(counts.by_class.items())),
         },
         "master": {name: state.counters[name] for name in ("sent", "repeated", "failed", "cycles")},
-        "core": {"interrupts": stats.irq_count, "longest_busy_clocks": stats.irq_clocks_max},
+        "core": {"interrupts": stats.irq_count, "longest_busy_clocks": stats.irq_clocks_max,
+                 "longest_busy_in_cycle_clocks": stats.irq_clocks_max_cycle},
         "start": {
             "first_telegram_ns": counts.first_ns, "first_cycle_ns": counts.first_cycle_ns,
             "start_up_ns": counts.first_cycle_ns - counts.first_ns if counts.first_cycle_ns is not None else None,
@@ -219,7 +220,8 @@ def render(report: dict[str, Any]) -> Group:
         ("calls", ", ".join(f"{name} {count}" for name, count in telegrams["by_call"].items()) or "none"),
         ("answers", ", ".join(f"{name} {count}" for name, count in telegrams["by_class"].items()) or "none"),
         ("master counts", ", ".join(f"{name} {count}" for name, count in report["master"].items())),
-        ("core", f"{report['core']['interrupts']} interrupts, longest {report['core']['longest_busy_clocks']} clocks"),
+        ("core", f"{report['core']['interrupts']} times awake, longest {report['core']['longest_busy_clocks']} clocks, "
+                 f"{report['core']['longest_busy_in_cycle_clocks']} while cycles run"),
         ("start-up", f"first telegram at {us(start['first_telegram_ns'])}, first cycle at "
                      f"{us(start['first_cycle_ns'])}, {us(start['start_up_ns'])} from one to the other"),
         ("phases", phases or "none"),
