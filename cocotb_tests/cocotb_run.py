@@ -27,7 +27,7 @@ class _Quick(Verilator):
 
 def run_cocotb(top, sources, test_module, *, name=None, parameters=None, extra_args=(), env=None, plusargs=(),
                quick=False):
-    """Build `top` from PACKAGES + sources (paths below rtl/ or absolute) and run test_module; AssertionError on failure.
+    """Build `top` from PACKAGES + sources (paths below rtl/ or absolute) and run test_module; AssertionError if not.
 
     quick: only the signals that a .vlt file among extra_args makes public are seen by the tests.
     """

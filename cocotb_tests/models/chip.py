@@ -7,7 +7,6 @@ the slaves. Times of the line are ns since the pins were coupled; fractions come
 import cocotb
 from asi import regmap
 from asi.window import COUNTERS, State
-from cocotb.handle import Immediate
 from cocotb.triggers import Event, FallingEdge, RisingEdge, Timer
 from cocotb.utils import get_sim_time
 
@@ -18,13 +17,14 @@ from .slaves import SlaveNetwork
 MASTER = "master"
 MAGIC = 0x4D49_5341             # 'ASIM'
 PS = 1_000
+SKEW_PS = 1                     # pins change this much after the instant of the line
 
 
 class LinePins:
     """Couples tx_man_o, tx_en_o, rx_p_i, rx_n_i of a DUT with a Line, own pulses included, as on a real line.
 
-    A falling edge of tx_man_o while tx_en_o is a negative pulse, a rising edge a positive one. The receiver pins change
-    before the clock edge of the same instant is seen, as if the pulse had come just before it.
+    A falling edge of tx_man_o while tx_en_o is a negative pulse, a rising edge a positive one. A pulse on a clock
+    edge comes just after it, as the chip's own outputs do, whoever makes the clock: then gaps are exact, not one short.
     """
 
     def __init__(self, dut, line=None, sender=MASTER):
@@ -33,7 +33,7 @@ class LinePins:
         self._pins = {-1: dut.rx_n_i, 1: dut.rx_p_i}
         self._last = {-1: -1, 1: -1}        # end of the pulse that is on the pin
         for pin in self._pins.values():
-            pin.value = Immediate(0)
+            pin.value = 0
         self.line.on_earlier = self._earlier
         self.line.listen(self._show)
         self._work = Event()
@@ -63,10 +63,10 @@ class LinePins:
         while True:
             while line.next_ns is not None:
                 self._target = line.next_ns
-                if (wait_ps := round(self._target * PS) - self._now_ps()) > 0:
+                if (wait_ps := round(self._target * PS) + SKEW_PS - self._now_ps()) > 0:
                     await Timer(wait_ps, "ps")
                 target, self._target = self._target, None   # on_earlier needs nothing while the queue is being run
-                line.advance(max(target, self.now()))       # a fraction of a ns may be rounded
+                line.advance(target)
             self._work.clear()
             self._target = float("inf")
             await self._work.wait()
@@ -82,7 +82,7 @@ class LinePins:
         self._target = None
 
     def _show(self, pulse):
-        self._pins[pulse.polarity].set(Immediate(1))
+        self._pins[pulse.polarity].value = 1
         self.line.at(pulse.t_ns + pulse.width_ns, self._hide, pulse.polarity)
 
     def _hide(self, polarity):
@@ -90,7 +90,7 @@ class LinePins:
         if end > self.line.now:             # a second sender made it longer
             self.line.at(end, self._hide, polarity)
         else:
-            self._pins[polarity].set(Immediate(0))
+            self._pins[polarity].value = 0
 
 
 class HostPort:

@@ -51,7 +51,7 @@ class Bench:
 
 @cocotb.test(timeout_time=30, timeout_unit="ms")
 async def pulses_and_gaps(dut):
-    """TL-005, LT-004, LT-005, SL-002: the line carries the pulses of the codec; the gaps are exact to the clock."""
+    """TL-005, LT-004, LT-005, SL-002: the line carries the pulses of the codec; the gaps are exact."""
     bench = await Bench().start(dut)
     net = SlaveNetwork(bench.line, [Slave(5, inputs=3)])
     await Timer(POWER_UP_NS, "ns")
@@ -64,8 +64,7 @@ async def pulses_and_gaps(dut):
     starts = bench.starts()
     answer = lambda delay: 78_000 + delay + 36_000 + 18_500  # noqa: E731
     expected = [answer(33_500), answer(21_500), 150_000]
-    clock_ns = bench.period_ps / 1_000
-    assert all(abs(b - a - e) <= clock_ns for a, b, e in zip(starts, starts[1:], expected)), starts
+    assert [b - a for a, b in zip(starts, starts[1:])] == expected
     assert net.slaves[0].synchronous and [r.error_class for r in bench.monitor.telegrams[:3]] == [0, 0, 1]
 
 

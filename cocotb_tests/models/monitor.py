@@ -18,7 +18,7 @@ ANSWER_NS = end_ns(ANSWER_BITS) + QUIET_NS + WIN_LATE_NS    # length window of a
 
 @dataclass
 class Telegram:
-    """One call. t_ns: first pulse of the request; delay_ns: last request pulse to first answer pulse, -1 without answer.
+    """One call. t_ns: first pulse of the request; delay_ns: last request pulse to first answer pulse, -1 without.
 
     error_class judges the answer, or the request itself when request_ok is False (then call is None).
     data: the answer nibble when error_class is OK and there was an answer, else None.

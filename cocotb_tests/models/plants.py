@@ -73,7 +73,8 @@ class Player:
             if hasattr(step, "do"):
                 await self._act(step)
             else:
-                differences = compare(step, await self.chip.host.state(), await self.chip.host.inputs(), self.cycle_max_ns)
+                host = self.chip.host
+                differences = compare(step, await host.state(), await host.inputs(), self.cycle_max_ns)
                 assert not differences, f"at {time_ns} ns: {'; '.join(differences)}"
 
     async def until(self, time_ns):

@@ -326,7 +326,8 @@ def test_new_request_needs_a_pause():
         bench = Bench(Slave(5))
         broken = request_pulses(encode_call("RDIO", 5))[:5]
         start = broken[-1][0] + gap
-        assert bench.request(broken + [(start + t, p) for t, p in request_pulses(encode_call("RDIO", 5))])[:1] == expected
+        again = [(start + t, p) for t, p in request_pulses(encode_call("RDIO", 5))]
+        assert bench.request(broken + again)[:1] == expected
 
 
 COMMANDS = [("RDIO", 3), ("RDID", 0xA), ("RID1", None), ("RID2", 0xE), ("RDST", 0), ("RES", 6), ("DELA", 0)]

@@ -78,7 +78,6 @@ async def full_cycle(dut):
     for _ in range(12):
         await RisingEdge(dut.sync_o)
         syncs.append(chip.pins.now())
-    clock_ns = 62.5
     periods = [b - a for a, b in pairwise(syncs)]
     assert max(periods) <= 4_950_000, periods
     records = [r for r in chip.telegrams() if r.t_ns >= syncs[1]]
@@ -87,18 +86,16 @@ async def full_cycle(dut):
     starts = [k for k, r in enumerate(records) if decode_call(r.call).name == "DEXG" and numbers[k] == 1]
     for a, b in pairwise(starts):
         assert numbers[a:a + 31] == list(range(1, 32)) and b - a == 32, numbers[a:b]
-    assert max(periods) - min(periods) <= clock_ns, periods
-    for a, b in pairwise(records):
-        gap = b.t_ns - a.t_ns
-        expected = 154_000 if a.error_class is ErrorClass.OK else 150_000
-        assert abs(gap - expected) <= clock_ns, (a, b)
+    assert max(periods) - min(periods) <= 62.5, periods
+    for a, b in pairwise(records):      # P_GAP_OK after an answer, P_GAP_NORSP after the time-out, to the clock
+        assert b.t_ns - a.t_ns == (154_000 if a.error_class is ErrorClass.OK else 150_000), (a, b)
     assert {r.error_class for r in records} <= {ErrorClass.OK, ErrorClass.NO_RESPONSE}
     assert (await chip.host.inputs())[1:32] == [n & 15 for n in range(1, 32)]
 
 
 @cocotb.test(timeout_time=600, timeout_unit="ms")
 async def dropout_and_return(dut):
-    """EX-012, EX-013, EX-015, LK-003, LK-004, LK-005: a slave that is unplugged is called six times, leaves, comes back."""
+    """EX-012, EX-013, EX-015, LK-003, LK-004, LK-005: an unplugged slave is called six times, leaves, returns."""
     slave = Slave(7, inputs=9)
     chip = await running(dut, Slave(3, inputs=5), slave)
     assert (await chip.host.inputs())[7] == 9
@@ -149,7 +146,7 @@ async def mode_change(dut):
 
 @cocotb.test(timeout_time=600, timeout_unit="ms")
 async def power_dip(dut):
-    """EX-001, EX-021, LT-010, LT-011: no telegram starts while APF is set; afterwards the master starts again by itself."""
+    """EX-001, EX-021, LT-010, LT-011: no telegram starts while APF is set; then the master starts by itself."""
     chip = await running(dut, Slave(3, inputs=5), Slave(5, io=8))
     requests = []
     chip.line.listen(lambda p: p.sender == MASTER and requests.append(p.t_ns))
@@ -216,7 +213,7 @@ async def images(dut):
 
 @cocotb.test(timeout_time=300, timeout_unit="ms")
 async def activation_calls(dut):
-    """EX-003, EX-008, CA-002: before DEXG a slave gets WPAR with its parameter and DEXG with F; nothing comes earlier."""
+    """EX-003, EX-008, CA-002: WPAR with the parameter, then DEXG with F; nothing before the settle time."""
     chip = Chip(dut, [Slave(3, inputs=1)])
     await chip.reset()
     await chip.host.write("PP", 5, 3)

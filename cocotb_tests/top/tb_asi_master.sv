@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tb_asi_master: asi_master with a clock made here, so that cocotb wakes up for line and host only, not for every clock.
+// tb_asi_master: asi_master with a clock made here, so cocotb wakes up for line and host only.
 // The pins are the signals of the bench, named as those of the chip; public.vlt makes them (and only them) visible.
 module tb_asi_master #(
   parameter int unsigned ClkHz = 16_000_000

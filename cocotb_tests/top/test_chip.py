@@ -10,7 +10,7 @@ SOURCES = [line for line in (RTL / "asi_master.f").read_text().splitlines() if l
 
 
 def test_chip():
-    """PL-004, LK-011, LK-012, LK-013: the whole chip with its firmware on the Python models, one build for all tests."""
+    """PL-004, LK-011, LK-012, LK-013: the whole chip with its firmware on the Python models, one build for all."""
     firmware = ROOT / "build/firmware/asi_test.hex"
     assert firmware.exists(), f"{firmware} is missing: make firmware"
     run_cocotb("tb_asi_master", [*(s for s in SOURCES if RTL / s not in PACKAGES), VEXRISCV, HERE / "tb_asi_master.sv"],
