@@ -178,3 +178,17 @@ async def interrupt_and_attention(dut):
     await tb.do(tb.host, (seq, 1, 15, 6))
     await tb.do(tb.host, (seq, 1, 1, 7))
     assert sum(attn) == 2
+
+
+@cocotb.test(timeout_time=1, timeout_unit="ms")
+async def reset_clears_magic(dut):
+    """HW-001: after a reset MAGIC reads 0 and everything else is as it was, whatever the ports do in it."""
+    tb = TB(dut)
+    await tb.reset()
+    words = (regmap.HOST_MAGIC // 4, regmap.HOST_MAGIC // 4 + 1, 0xFFF)
+    await tb.fill(words)
+    dut.rst_i.value = 1
+    await tb.reset()
+    tb.mem[words[0]] = 0
+    for word in words:
+        await tb.do(tb.host, (word, 0, 15, 0))

@@ -255,15 +255,11 @@ class Chip:
         dut.spi_miso_i.value = 0
 
     async def reset(self, clocks=4):
-        """Reset for some clocks, then wait for the firmware to show itself (at most 50 ms).
-
-        A reset leaves the memories as they are: without a MAGIC of 0 the one of an earlier start would be taken for it.
-        """
+        """Reset for some clocks, then wait for the firmware to show itself (at most 50 ms). Reset clears MAGIC."""
         self.dut.rst_i.value = 1
         for _ in range(clocks):
             await RisingEdge(self.dut.clk_i)
         self.dut.rst_i.value = 0
-        await self.host.write("MAGIC", 0)
         await self.host.until(self.host.ready, 50_000, "MAGIC")
 
     def supply(self, good):

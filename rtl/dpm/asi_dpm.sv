@@ -2,7 +2,8 @@
 // asi_dpm: the 16 KB dual-port memory: one single-port RAM, shared by the core and the native host port.
 // Bus rule, both ports: a request and its inputs are held until ready (one clock); a read's data is valid with it.
 // An access takes two clocks, and a port cannot begin one in the clock of its ready, so with both ports always busy
-// they take turns and neither waits longer than one clock. Requirement: HW-006.
+// they take turns and neither waits longer than one clock. Reset clears MAGIC, so that a host never takes the window of
+// the time before for a new one. Requirements: HW-001, HW-006.
 module asi_dpm (
   input  logic        clk_i, rst_i,               // rst_i: synchronous, active high
   // core
@@ -35,11 +36,11 @@ module asi_dpm (
 
   asi_ram #(.Words(4096)) u_ram (
     .clk_i,
-    .req_i   (core_go | host_go),
-    .we_i    (core_go ? core_we_i    : host_we_i),
-    .be_i    (core_go ? core_be_i    : host_be_i),
-    .addr_i  (core_go ? core_addr_i  : host_addr_i),
-    .wdata_i (core_go ? core_wdata_i : host_wdata_i),
+    .req_i   (rst_i | core_go | host_go),
+    .we_i    (rst_i | (core_go ? core_we_i : host_we_i)),
+    .be_i    ({4{rst_i}} | (core_go ? core_be_i : host_be_i)),
+    .addr_i  (rst_i ? 12'(asi_map_pkg::HostMagic / 4) : core_go ? core_addr_i : host_addr_i),
+    .wdata_i (rst_i ? '0 : core_go ? core_wdata_i : host_wdata_i),
     .rdata_o (rdata)
   );
   assign core_rdata_o = rdata;
