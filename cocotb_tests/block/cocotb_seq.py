@@ -825,3 +825,27 @@ async def stop_in_a_batch(dut):
     # a batch that starts while the line is off comes back at once
     dut.enable_i.value = 0
     assert await tb.batch(entries) == [e & 0xFF0000 | 0xFF0 for e in entries]
+
+
+@cocotb.test(timeout_time=60, timeout_unit="ms")
+async def stop_before_publication(dut):
+    """LK-007, LT-011: enable_i drops after the last answer: before the copy begins nothing is published, no event, no
+    CYCLES + 1; a copy that has begun is completed with its event."""
+    tb = TB(dut)
+    await tb.start()
+    tb.judged = False
+    tb.poke(40, 3)
+    tb.answer = lambda call: (OK, OK, len(tb.calls) & 15, 0)
+    for delay, published in ((0, 0), (1, 0), (3, 0), (5, 0), (14, 1), (25, 1)):
+        before = tb.peek(CYCLES), tb.peek(IN_IMG + 5)
+        dut.cycle_en_i.value = 1
+        await dut.res_count_o.value_change
+        await ClockCycles(dut.clk_i, delay)
+        await FallingEdge(dut.clk_i)
+        dut.enable_i.value = 0
+        await tb.idle()
+        dut.enable_i.value = 1
+        assert tb.peek(STATE + 40) & 15 == len(tb.calls) & 15 == tb.peek(IN_WORK + 5)  # the answer itself is booked
+        assert tb.peek(CYCLES) == int(dut.cycle_count_o.value) == before[0] + published, delay
+        assert tb.peek(IN_IMG + 5) == (len(tb.calls) & 15 if published else before[1]), delay
+        await ClockCycles(dut.clk_i, GAP)
