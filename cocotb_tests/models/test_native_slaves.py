@@ -120,6 +120,8 @@ def broken_requests():
         "alternation": [*good[:3], (good[3][0], -good[3][1]), *good[4:]],
         "timing early": [*good[:4], (good[4][0] - 876, good[4][1]), *good[5:]],
         "timing late": [*good[:4], (good[4][0] + 1_501, good[4][1]), *good[5:]],
+        "timing, boundary pulse": [(t + 1_501 * (t == 15_000), p) for t, p in good],
+        "two in one window": sorted([*good, *((15_000 + d, p * dict(good)[15_000]) for d, p in ((700, -1), (1_400, 1)))]),
         "no information": [p for p in good if p[0] not in (36_000, 33_000, 39_000)],
         "parity": pulses(word ^ 2, 14),
         "end bit": pulses(word ^ 1, 14),
@@ -328,6 +330,19 @@ def test_write_id1():
     assert line.call("RDIO", 9 + 32) == 7
 
 
+def test_write_id1_is_not_an_address():
+    """SL-005: WID1 stores ID1 only: a deleted address comes back with power, with the new Sel."""
+    line = Line()
+    s = line.net.add(5, io=7, **AB)
+    line.call("DELA", 5)
+    line.call("WID1", data=0xF)
+    line.wait(15 * MS)
+    line.net.advance(line.t)
+    line.net.power(False)
+    line.net.power(True)
+    assert line.net.state(s).address == 5 + 32
+
+
 def test_ab_data_exchange():
     """SL-005, CA-001, CA-002: I3 selects A or B; three output and parameter bits; D3 is an input; others are deaf."""
     line = Line()
@@ -412,6 +427,31 @@ def test_watchdog_not_at_address_0():
     line.wait(200 * MS)
     assert line.call("RDIO", 0) == 7
     assert not line.net.state(s).dexg_disabled
+
+
+def test_watchdog_waits_for_the_memory():
+    """SL-006: the watchdog does not reset a slave that is writing its memory, but does so when that is done."""
+    line = Line()
+    s = operating(line, 5, io=7, watchdog=True)
+    fed = line.t
+    line.call("DELA", 5)
+    line.t = fed + 90 * MS
+    line.call("ADRA", data=9)
+    line.net.advance(fed + 104 * MS)
+    assert not line.net.state(s).dexg_disabled
+    line.net.advance(fed + 106 * MS)
+    assert line.net.state(s).dexg_disabled
+
+
+def test_watchdog_rests_after_a_reset():
+    """SL-006: after a reset the watchdog runs from the next WPAR on: a slave that is not operated is not reset."""
+    line = Line()
+    operating(line, 5, io=7, watchdog=True)
+    line.call("RES", 5)
+    line.wait(2 * MS)
+    line.call("RDIO", 5)
+    line.wait(200 * MS)
+    assert line.raw(encode_call("RDIO", 5)) == (7, 21_500)
 
 
 # ------------------------------------------------------------------------------------------ SL-008
@@ -603,6 +643,8 @@ def shifted(time, to):
     (shifted(36_000, 37_500), ErrorClass.OK),
     (shifted(36_000, 37_501), ErrorClass.TIMING),
     (shifted(3_000, 4_501), ErrorClass.TIMING),
+    ([*E3[:-1], (38_500, 1)], ErrorClass.TIMING),  # too late for an end pulse
+    ([*E3, (9_000, -1)], ErrorClass.TIMING),  # two senders at once
     ([(0, 1)], ErrorClass.START),
     ([(0, -1)], ErrorClass.NO_INFORMATION),
 ])
@@ -649,12 +691,12 @@ def test_monitor_repetitions():
     """LT-012: the same call within 220 us of a failed one is a repetition; after a good one or later it is not."""
     line = Line()
     train = request_pulses(encode_call("RDIO", 5))
-    starts = [READY + t * US for t in (0, 150, 300, 521, 671)]
+    starts = [READY + t * US for t in (0, 150, 300, 520, 741, 891)]
     for start in starts:
         for t, polarity in train:
             line.net.master_pulse(start + t, polarity)
     line.net.advance(READY + 2 * MS)
-    assert [t.repeated for t in line.net.log()] == [0, 1, 1, 0, 1]
+    assert [t.repeated for t in line.net.log()] == [0, 1, 1, 1, 0, 1]
     line = Line()
     line.net.add(5, io=7)
     for _ in range(2):
