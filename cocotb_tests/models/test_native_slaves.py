@@ -121,7 +121,8 @@ def broken_requests():
         "timing early": [*good[:4], (good[4][0] - 876, good[4][1]), *good[5:]],
         "timing late": [*good[:4], (good[4][0] + 1_501, good[4][1]), *good[5:]],
         "timing, boundary pulse": [(t + 1_501 * (t == 15_000), p) for t, p in good],
-        "two in one window": sorted([*good, *((15_000 + d, p * dict(good)[15_000]) for d, p in ((700, -1), (1_400, 1)))]),
+        "two in one window": sorted([*good, *((15_000 + d, p * dict(good)[15_000])
+                                              for d, p in ((700, -1), (1_400, 1)))]),
         "no information": [p for p in good if p[0] not in (36_000, 33_000, 39_000)],
         "parity": pulses(word ^ 2, 14),
         "end bit": pulses(word ^ 1, 14),
