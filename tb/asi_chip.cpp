@@ -148,10 +148,14 @@ asi_chip::asi_chip(const char *firmware, const char *wave, uint64_t seed) : net(
 }
 
 asi_chip::~asi_chip() {
+    Verilated::threadContextp(&context);  // the model signs off at the thread's context, whichever chip that was
 #if VM_TRACE
     if (wave_) wave_->close();
+    wave_.reset();
 #endif
     top->final();
+    top.reset();
+    Verilated::threadContextp(Verilated::defaultContextp());  // this one goes
 }
 
 void asi_chip::dump(bool high) {
@@ -241,6 +245,7 @@ inline void asi_chip::step() {
 }
 
 void asi_chip::run_until(uint64_t until, bool stop_on_irq) {
+    Verilated::threadContextp(&context);
     schedule();  // the caller may have changed the slaves
     if (stop_on_irq) {
         while (clock < until && !top->host_irq_o) step();
@@ -251,6 +256,7 @@ void asi_chip::run_until(uint64_t until, bool stop_on_irq) {
 }
 
 uint32_t asi_chip::host(bool write, uint32_t byte_addr, uint32_t data, uint8_t byte_enable) {
+    Verilated::threadContextp(&context);
     schedule();
     top->host_req_i = 1;
     top->host_we_i = write;

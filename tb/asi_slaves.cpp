@@ -51,7 +51,7 @@ void Listener::begin(int64_t t) {
     word_ = 0;
 }
 
-Listener::Event Listener::pulse(int64_t t, int32_t polarity) {
+Listener::Event Listener::pulse(int64_t t, int32_t polarity) {  // after advance(t): no window before t was empty
     const int64_t silence = t - heard_;
     heard_ = t;
     if (state_ == State::kPause && silence > quiet_) state_ = State::kIdle;
@@ -65,7 +65,6 @@ Listener::Event Listener::pulse(int64_t t, int32_t polarity) {
         bad = next_bit_ == 14                                    // length: nothing may follow the end pulse
               || n <= window_                                    // timing (also two pulses in one window)
               || polarity == polarity_                           // alternation
-              || (n + 1) / 2 > next_bit_                         // no information in a window before this one
               || (n == 26 && polarity < 0);                      // end bit
         if (!bad && n % 2 == 0) {
             word_ = word_ << 1 | (polarity > 0);

@@ -15,7 +15,7 @@ $(TB_OUT)/libasi_slaves.so: $(TB_SLAVES) $(TB_HEADERS)
 	@echo "building $@"
 	@$(TB_CXX) $(TB_FLAGS) -shared $(TB_SLAVES) -o $@
 
-pytest test: $(TB_OUT)/libasi_slaves.so
+pytest test: $(addprefix $(TB_OUT)/,libasi_slaves.so libasi_chip.so libasi_chip_trace.so)
 
 # ---------------------------------------------------------------- whole chip
 # The firmware is not in the model: the image is loaded when a chip is made (+firmware=, FirmwareHex).

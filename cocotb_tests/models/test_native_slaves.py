@@ -4,7 +4,7 @@ import pytest
 
 from asi.native import CERTAIN, NativeError, Net
 from asi.regmap import ErrorClass
-from asi.telegram import encode_call, request_pulses, request_word, response_pulses
+from asi.telegram import encode_call, pulses, request_pulses, request_word, response_pulses
 
 US, MS = 1_000, 1_000_000
 AB = dict(id=0xA, id1=7, id2=0xE)
@@ -106,21 +106,23 @@ def test_answer_time_counts_from_the_real_last_pulse():
     """SL-002: a legal shift of the end pulse moves the answer with it."""
     line = Line()
     line.net.add(5, io=7)
-    pulses = request_pulses(encode_call("RDIO", 5))
+    train = request_pulses(encode_call("RDIO", 5))
     for shift in (-875, 1_500):
-        answer = line.send([*pulses[:-1], (pulses[-1][0] + shift, 1)])
+        answer = line.send([*train[:-1], (train[-1][0] + shift, 1)])
         assert answer[0][0] in (33_500, 21_500)
 
 
 def broken_requests():
     good = request_pulses(encode_call("RDIO", 5))
     word = request_word(encode_call("RDIO", 5))
-    from asi.telegram import pulses
     return {
         "start": [(t, -p) for t, p in good],
         "alternation": [*good[:3], (good[3][0], -good[3][1]), *good[4:]],
         "timing early": [*good[:4], (good[4][0] - 876, good[4][1]), *good[5:]],
         "timing late": [*good[:4], (good[4][0] + 1_501, good[4][1]), *good[5:]],
+        "timing, boundary pulse": [(t + 1_501 * (t == 15_000), p) for t, p in good],
+        "two in one window": sorted([*good, *((15_000 + d, p * dict(good)[15_000])
+                                              for d, p in ((700, -1), (1_400, 1)))]),
         "no information": [p for p in good if p[0] not in (36_000, 33_000, 39_000)],
         "parity": pulses(word ^ 2, 14),
         "end bit": pulses(word ^ 1, 14),
@@ -149,22 +151,22 @@ def test_windows_of_a_request():
     """SL-003: every pulse of a request may start 0.875 us early or 1.5 us late."""
     line = Line()
     line.net.add(5, io=7)
-    pulses = request_pulses(encode_call("RDIO", 5))
-    for i in range(1, len(pulses)):
+    train = request_pulses(encode_call("RDIO", 5))
+    for i in range(1, len(train)):
         for shift in (-875, 1_500):
-            moved = [(t + (shift if i == k else 0), p) for k, (t, p) in enumerate(pulses)]
+            moved = [(t + (shift if i == k else 0), p) for k, (t, p) in enumerate(train)]
             assert line.send(moved), f"pulse {i} moved by {shift}"
 
 
 def test_quiet_time_after_a_request():
-    """SL-002, SL-003: 90 us after the first pulse (6 < 12 < 18 us quiet) a synchronous slave has taken the request and an
+    """SL-002, SL-003: 90 us after the first pulse (6 < 12 < 18 us quiet) a synchronous slave has taken the request, an
     asynchronous one sees a length error."""
     line = Line()
-    pulses = request_pulses(encode_call("RDIO", 5))
+    train = request_pulses(encode_call("RDIO", 5))
     line.net.add(5, io=7)
     line.call("RDIO", 5)
-    assert line.send([*pulses, (90_000, -1)])
-    assert line.send([*pulses, (90_000, -1)]) == []  # the lone pulse was a bad request
+    assert line.send([*train, (90_000, -1)])
+    assert line.send([*train, (90_000, -1)]) == []  # the lone pulse was a bad request
 
 
 def test_pause_after_a_bad_request():
@@ -179,7 +181,7 @@ def test_pause_after_a_bad_request():
 
 
 def test_request_for_another_address():
-    """SL-004: a good request for another address keeps a slave synchronous, and makes an asynchronous one synchronous."""
+    """SL-004: a good request for another address keeps a slave synchronous or makes it so."""
     line = Line()
     line.net.add(5, io=7)
     assert line.call("RDIO", 9) is None
@@ -329,6 +331,19 @@ def test_write_id1():
     assert line.call("RDIO", 9 + 32) == 7
 
 
+def test_write_id1_is_not_an_address():
+    """SL-005: WID1 stores ID1 only: a deleted address comes back with power, with the new Sel."""
+    line = Line()
+    s = line.net.add(5, io=7, **AB)
+    line.call("DELA", 5)
+    line.call("WID1", data=0xF)
+    line.wait(15 * MS)
+    line.net.advance(line.t)
+    line.net.power(False)
+    line.net.power(True)
+    assert line.net.state(s).address == 5 + 32
+
+
 def test_ab_data_exchange():
     """SL-005, CA-001, CA-002: I3 selects A or B; three output and parameter bits; D3 is an input; others are deaf."""
     line = Line()
@@ -413,6 +428,31 @@ def test_watchdog_not_at_address_0():
     line.wait(200 * MS)
     assert line.call("RDIO", 0) == 7
     assert not line.net.state(s).dexg_disabled
+
+
+def test_watchdog_waits_for_the_memory():
+    """SL-006: the watchdog does not reset a slave that is writing its memory, but does so when that is done."""
+    line = Line()
+    s = operating(line, 5, io=7, watchdog=True)
+    fed = line.t
+    line.call("DELA", 5)
+    line.t = fed + 90 * MS
+    line.call("ADRA", data=9)
+    line.net.advance(fed + 104 * MS)
+    assert not line.net.state(s).dexg_disabled
+    line.net.advance(fed + 106 * MS)
+    assert line.net.state(s).dexg_disabled
+
+
+def test_watchdog_rests_after_a_reset():
+    """SL-006: after a reset the watchdog runs from the next WPAR on: a slave that is not operated is not reset."""
+    line = Line()
+    operating(line, 5, io=7, watchdog=True)
+    line.call("RES", 5)
+    line.wait(2 * MS)
+    line.call("RDIO", 5)
+    line.wait(200 * MS)
+    assert line.raw(encode_call("RDIO", 5)) == (7, 21_500)
 
 
 # ------------------------------------------------------------------------------------------ SL-008
@@ -548,14 +588,14 @@ EXAMPLES = [  # section 10: call, printed request word, printed grid (one charac
 def test_worked_requests(call, word, grid):
     """TL-001, TL-003, TL-006: listener and monitor read the printed pulse trains as the printed words."""
     assert request_word(call) == word
-    pulses = request_pulses(call)
+    train = request_pulses(call)
     if grid:
-        pulses = [(3_000 * i, {"-": -1, "+": 1}[c]) for i, c in enumerate(grid) if c != "."]
+        train = [(3_000 * i, {"-": -1, "+": 1}[c]) for i, c in enumerate(grid) if c != "."]
     line = Line()
     slaves = {i: line.net.add(i, io=7, **(AB if i in (37,) else {})) for i in (0, 5, 12, 37)}
     line.send(request_pulses(encode_call("RDIO", 1)))
     line.net.log()
-    line.send(pulses)
+    line.send(train)
     (record,) = line.net.log()
     assert (record.call, record.request_ok) == (call, 1)
     assert all(line.net.state(s).synchronous or word in (0x1FD7, 0x12D3) for s in slaves.values())
@@ -604,6 +644,8 @@ def shifted(time, to):
     (shifted(36_000, 37_500), ErrorClass.OK),
     (shifted(36_000, 37_501), ErrorClass.TIMING),
     (shifted(3_000, 4_501), ErrorClass.TIMING),
+    ([*E3[:-1], (38_500, 1)], ErrorClass.TIMING),  # too late for an end pulse
+    ([*E3, (9_000, -1)], ErrorClass.TIMING),  # two senders at once
     ([(0, 1)], ErrorClass.START),
     ([(0, -1)], ErrorClass.NO_INFORMATION),
 ])
@@ -649,17 +691,17 @@ def test_monitor_requests():
 def test_monitor_repetitions():
     """LT-012: the same call within 220 us of a failed one is a repetition; after a good one or later it is not."""
     line = Line()
-    pulses = request_pulses(encode_call("RDIO", 5))
-    starts = [READY + t * US for t in (0, 150, 300, 521, 671)]
+    train = request_pulses(encode_call("RDIO", 5))
+    starts = [READY + t * US for t in (0, 150, 300, 520, 741, 891)]
     for start in starts:
-        for t, polarity in pulses:
+        for t, polarity in train:
             line.net.master_pulse(start + t, polarity)
     line.net.advance(READY + 2 * MS)
-    assert [t.repeated for t in line.net.log()] == [0, 1, 1, 0, 1]
+    assert [t.repeated for t in line.net.log()] == [0, 1, 1, 1, 0, 1]
     line = Line()
     line.net.add(5, io=7)
     for _ in range(2):
-        for t, polarity in pulses:
+        for t, polarity in train:
             line.net.master_pulse(line.t + t, polarity)
         line.t += 158 * US
     line.net.advance(line.t)
