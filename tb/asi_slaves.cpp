@@ -107,15 +107,16 @@ void Slave::restart(int64_t now, int64_t silent) {
     outputs_ = parameter_ = 0xF;
     dexg_disabled_ = true;
     synchronous_ = false;
-    watchdog_at_ = kNever;     // starts with the first WPAR: before it there is nothing to switch off
     ready_at_ = now + silent;
+    watchdog_at_ = watchdog_ ? ready_at_ + kWatchdogTime : kNever;
 }
 
 void Slave::catch_up(int64_t now) {
     if (writing_ && now >= write_end_) writing_ = corrupt_ = false;
-    // address 0 and a running write keep the watchdog from biting, not from running out
-    const int64_t bite = std::max(watchdog_at_, write_end_);
-    if (watchdog_at_ != kNever && number_ != 0 && alive() && now >= bite) restart(bite, kResetTime);
+    // address 0 and a running write keep the watchdog from biting, not from running out; a slave that nobody serves
+    // is reset again and again
+    if (!alive() || number_ == 0 || watchdog_at_ == kNever) return;
+    for (int64_t bite; (bite = std::max(watchdog_at_, write_end_)) <= now;) restart(bite, kResetTime);
 }
 
 void Slave::power_down(int64_t now) {

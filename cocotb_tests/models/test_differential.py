@@ -203,7 +203,6 @@ def test_watchdog():
         assert pair.call("RDIO", 0) and pair.call("RDIO", 4)
 
 
-@pytest.mark.xfail(strict=True, reason="the native slaves start their watchdog only with the first DEXG or WPAR")
 def test_watchdog_of_a_slave_that_is_never_served():
     """SL-007, SL-006: 94.2 ms without DEXG or WPAR reset a slave, also when there never was one."""
     pair = Pair(dict(address=3, io=7, watchdog=True))

@@ -444,15 +444,20 @@ def test_watchdog_waits_for_the_memory():
     assert line.net.state(s).dexg_disabled
 
 
-def test_watchdog_rests_after_a_reset():
-    """SL-006: after a reset the watchdog runs from the next WPAR on: a slave that is not operated is not reset."""
-    line = Line()
-    operating(line, 5, io=7, watchdog=True)
-    line.call("RES", 5)
-    line.wait(2 * MS)
-    line.call("RDIO", 5)
-    line.wait(200 * MS)
-    assert line.raw(encode_call("RDIO", 5)) == (7, 21_500)
+def test_watchdog_without_a_master():
+    """SL-006: a slave that nobody serves is reset 94.2 ms after each of its starts, and silent for 1 ms each time."""
+    for number in (1, 2, 7):
+        line = Line(start=0)
+        line.net.add(5, io=7, watchdog=True)
+        ready = 10 * MS + number * 95_200 * US
+        line.t = ready - 500 * US
+        assert line.call("RDIO", 5) is None
+        line.t = ready - 1
+        assert line.call("RDIO", 5) is None
+        assert line.raw(encode_call("RDIO", 5)) == (7, 33_500)
+        line.t = ready + 94_200 * US - 100 * US  # taken 14 us before the next reset
+        assert line.raw(encode_call("RDIO", 5)) == (7, 21_500)
+        assert line.call("RDIO", 5) is None
 
 
 # ------------------------------------------------------------------------------------------ SL-008
