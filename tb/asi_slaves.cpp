@@ -113,8 +113,8 @@ void Slave::restart(int64_t now, int64_t silent) {
 
 void Slave::catch_up(int64_t now) {
     if (writing_ && now >= write_end_) writing_ = corrupt_ = false;
-    // address 0 and a running write keep the watchdog from biting, not from running out; a slave that nobody serves
-    // is reset again and again
+    // a running write keeps the watchdog from biting, not from running out; a slave that nobody serves is reset again
+    // and again
     if (!alive() || number_ == 0 || watchdog_at_ == kNever) return;
     for (int64_t bite; (bite = std::max(watchdog_at_, write_end_)) <= now;) restart(bite, kResetTime);
 }
@@ -178,6 +178,7 @@ bool Slave::request(unsigned call, int64_t now, int64_t last, unsigned &answer) 
     if (!control && number == 0) {                   // ADRA
         requests_++;
         number_ = static_cast<uint8_t>(info);
+        if (watchdog_) watchdog_at_ = now + kWatchdogTime;  // time at address 0 does not count
         write_memory(now);
         answer = kAck;
     } else if (!control) {                           // DEXG, WPAR
