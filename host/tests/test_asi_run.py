@@ -105,9 +105,9 @@ def test_report_and_json_say_the_same(tmp_path):
             shown = [row["name"], row["profile"], " ".join(lists)] + [row[k] for k in ("inputs", "outputs") if row[k]]
             assert re.search(r"\s+".join(map(re.escape, shown)), line)
     start = result["start"]
-    assert f"first telegram at {report.us(start['first_telegram_ns'])}, first cycle at " in text
+    assert f"first telegram at {report.ms(start['first_telegram_ns'])}, first cycle at " in text
     for phase, time_ns in result["phases_ns"].items():
-        assert (f"{phase} {report.us(time_ns)}" in text) == bool(time_ns)
+        assert (f"{phase} {report.ms(time_ns)}" in text) == bool(time_ns)
 
 
 def test_report_numbers_are_the_log_s(tmp_path):

@@ -136,7 +136,7 @@ def run(
     if quick and not chosen:
         console.print("note: the wait after power-up is 20 ms instead of 1 s in this run (--no-quick, QUICK=0 keeps it)")
     if until_ns <= settle_ns:
-        console.print(f"note: the line stays quiet until {report.us(settle_ns)}, the wait after power-up")
+        console.print(f"note: the line stays quiet until {report.ms(settle_ns)}, the wait after power-up")
     wave_path = out / "waves.part" if waves else None
     image = firmware or FIRMWARE / ("asi_test.hex" if quick else "asi.hex")
     files = ["report.json", *(["telegrams.log", "telegrams.jsonl"] if log else [])]
@@ -156,7 +156,7 @@ def run(
     console.print(Text(f"written: {', '.join(str(out / name) for name in files)}", style="dim"), soft_wrap=True)
     for check in result["checks"]:
         for difference in check["differences"]:
-            typer.echo(f"not met: {check['name']} at {report.us(check['at_ns'])}: {difference}", err=True)
+            typer.echo(f"not met: {check['name']} at {report.ms(check['at_ns'])}: {difference}", err=True)
     if result["error"]:
         typer.echo(f"simulation: {result['error']}", err=True)
     raise typer.Exit(EXIT_CODES[result["result"]])
@@ -170,7 +170,7 @@ def check(
     for path in plants:
         described = _load(path)
         typer.echo(f"{path}: {described.name}: {len(described.slaves)} slaves, {len(described.host.pcd)} projected, "
-                   f"{report.us(described.duration_ns)}")
+                   f"{report.ms(described.duration_ns)}")
 
 
 def main() -> None:

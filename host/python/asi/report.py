@@ -117,10 +117,13 @@ def write(report: dict[str, Any], path: Path) -> None:
 
 # ---------------------------------------------------------------- the terminal
 def us(time_ns: int | None) -> str:
-    """4928000 -> '4928.000 us'; milliseconds from 10 ms on."""
-    if time_ns is None:
-        return "-"
-    return f"{time_ns / 1e3:.3f} us" if time_ns < 10_000_000 else f"{time_ns / 1e6:.3f} ms"
+    """4928000 -> '4928.000 us': for what is compared to the clock."""
+    return "-" if time_ns is None else f"{time_ns / 1e3:.3f} us"
+
+
+def ms(time_ns: int | None) -> str:
+    """1500003000 -> '1500.003 ms'."""
+    return "-" if time_ns is None else f"{time_ns / 1e6:.3f} ms"
 
 
 def _ranges(addresses: list[str]) -> str:
@@ -188,7 +191,7 @@ def _checks(checks: list[dict[str, Any]]) -> Text:
     text = Text()
     styles = {"met": "green", "not met": "bold red", "not reached": "yellow"}
     for number, check in enumerate(checks):
-        text.append(f"{chr(10) if number else ''}{check['name']} at {us(check['at_ns'])}: ")
+        text.append(f"{chr(10) if number else ''}{check['name']} at {ms(check['at_ns'])}: ")
         text.append(check["result"], style=styles[check["result"]])
         for difference in check["differences"]:
             text.append(f"\n  {difference}")
@@ -202,7 +205,7 @@ def render(report: dict[str, Any]) -> Group:
     ratio = "-" if run["real_time_ratio"] is None else f"{run['real_time_ratio']:.2f} x real time"
     title = Text.assemble((report["plant"]["name"], "bold"), "  ", (report["result"].upper(), f"bold {style}"))
     head = _pairs([
-        ("bus time", f"{us(run['bus_time_ns'])} in {run['wall_s']:.1f} s ({ratio}), "
+        ("bus time", f"{ms(run['bus_time_ns'])} in {run['wall_s']:.1f} s ({ratio}), "
                      f"{run['clocks']} clocks at {run['clk_hz'] / 1e6:g} MHz"),
         ("firmware", run["firmware"] or "not started"),
         ("phase", state["phase"]),
@@ -210,7 +213,7 @@ def render(report: dict[str, Any]) -> Group:
         *[(name.upper(), f"{len(state[name])}: {_list_text(state[name])}" if state[name] else "none")
           for name in LISTS],
     ])
-    phases = ", ".join(f"{name} {us(time)}" for name, time in report["phases_ns"].items() if time)
+    phases = ", ".join(f"{name} {ms(time)}" for name, time in report["phases_ns"].items() if time)
     start = report["start"]
     foot = _pairs([
         ("cycle", f"min {us(cycles['min_ns'])}, mean {us(cycles['mean_ns'])}, max {us(cycles['max_ns'])}; "
@@ -222,8 +225,8 @@ def render(report: dict[str, Any]) -> Group:
         ("master counts", ", ".join(f"{name} {count}" for name, count in report["master"].items())),
         ("core", f"{report['core']['interrupts']} times awake, longest {report['core']['longest_busy_clocks']} clocks, "
                  f"{report['core']['longest_busy_in_cycle_clocks']} while cycles run"),
-        ("start-up", f"first telegram at {us(start['first_telegram_ns'])}, first cycle at "
-                     f"{us(start['first_cycle_ns'])}, {us(start['start_up_ns'])} from one to the other"),
+        ("start-up", f"first telegram at {ms(start['first_telegram_ns'])}, first cycle at "
+                     f"{ms(start['first_cycle_ns'])}, {ms(start['start_up_ns'])} from one to the other"),
         ("phases", phases or "none"),
         ("expected", _checks(report["checks"])),
     ])
