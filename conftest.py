@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""After a run with RTL_COVERAGE=1: the coverage figures, above pytest's closing line."""
+"""After a run with ASI_COVERAGE=1: the coverage figures, above pytest's closing line."""
 import json
 import os
 from pathlib import Path
 
 
 def pytest_terminal_summary(terminalreporter):
-    if os.environ.get("RTL_COVERAGE") != "1":
+    if os.environ.get("ASI_COVERAGE") != "1":
         return
     from tools.coverage import report
     text, data = report()

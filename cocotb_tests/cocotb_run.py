@@ -2,7 +2,7 @@
 """Build a module with Verilator and run a cocotb test module on it, from pytest.
 
 Everything lands in build/cocotb/<name>; each cocotb test becomes part of the pytest test that calls this.
-Set WAVES=1 for a waveform (FST where lz4 and zlib headers exist, else VCD), RTL_COVERAGE=1 for line coverage.
+Set WAVES=1 for a waveform (FST where lz4 and zlib headers exist, else VCD), ASI_COVERAGE=1 for line coverage.
 """
 import os
 import shutil
@@ -35,7 +35,7 @@ def run_cocotb(top, sources, test_module, *, name=None, parameters=None, extra_a
     build_dir = ROOT / "build/cocotb" / name
     waves = os.environ.get("WAVES") == "1"
     args = ["--assert", "-Wall", "--timescale", "1ns/1ps", str(ROOT / "tools/lint.vlt"), *extra_args]
-    if os.environ.get("RTL_COVERAGE") == "1":
+    if os.environ.get("ASI_COVERAGE") == "1":
         args.append("--coverage-line")
     os.environ.setdefault("OBJCACHE", f"bash {ROOT / 'tools/objcache.sh'} {ROOT / 'build/objcache'}")
     runner = _Quick() if quick else get_runner("verilator")

@@ -4,7 +4,7 @@
 #   build/tb/libasi_chip.so         whole chip, as fast as it gets
 #   build/tb/libasi_chip_trace.so   the same with waves (FST where the headers of lz4 and zlib are found, else VCD)
 TB_OUT     := $(BUILD)/tb
-TB_CXX     ?= g++
+TB_CXX     ?= $(CXX)
 TB_FLAGS   := -std=c++20 -O3 -fPIC -Wall -Wextra -Werror
 TB_HEADERS := $(wildcard tb/*.h) tb/tb.mk
 TB_SLAVES  := tb/asi_slaves.cpp tb/asi_monitor.cpp

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Line coverage of the RTL from Verilator's coverage files, and of the firmware from gcov, as one figure each.
 
-usage: coverage.py [--json FILE]   reads build/coverage-*.dat and build/firmware/coverage/*.gcda (if gcov is there)
+usage: coverage.py [--json FILE]   reads build/coverage-*.dat and build/firmware/native/*.gcda (if gcov is there)
 Prints a line per file below 100 %, then the totals. Exit code 0; 2 when there is nothing to read.
 """
 import argparse
@@ -43,7 +43,7 @@ def rtl_lines(build):
 def firmware_lines(build):
     """-> {file: {line: hits}} from gcov's JSON; empty when gcov is missing or nothing was built for coverage."""
     lines = defaultdict(dict)
-    counters = sorted((build / "firmware/coverage").rglob("*.gcda"))
+    counters = sorted((build / "firmware/native").glob("*.gcda"))
     if not counters or not shutil.which("gcov"):
         return lines
     with tempfile.TemporaryDirectory() as tmp:
@@ -56,7 +56,7 @@ def firmware_lines(build):
                     name = path.resolve().relative_to(ROOT).as_posix()
                 except ValueError:
                     continue
-                if name.startswith(("firmware/core", "firmware/app")):
+                if name.startswith("firmware/core"):
                     for row in entry["lines"]:
                         number = row["line_number"]
                         lines[name][number] = lines[name].get(number, 0) + row["count"]
@@ -72,7 +72,7 @@ def totals(lines):
 def report(build=ROOT / "build"):
     """-> (list of text lines, dict for JSON)"""
     text, data = [], {}
-    for name, lines in (("RTL", rtl_lines(build)), ("firmware", firmware_lines(build))):
+    for name, lines in (("RTL", rtl_lines(build)), ("firmware core", firmware_lines(build))):
         data[name] = totals(lines)
         data[name]["missing"] = {}
         for path, rows in sorted(lines.items()):

@@ -4,3 +4,10 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+
+def pytest_sessionfinish():
+    """A worker of a parallel run may be killed before its libraries write their coverage counters."""
+    import native
+    if native.load.cache_info().currsize:
+        native.load()[1].fw_counters_write()

@@ -199,3 +199,10 @@ unsigned fw_list_next(const uint32_t list[2], unsigned from)
     asi_list_t l = {{list[0], list[1]}};
     return asi_list_next(&l, from);
 }
+
+#ifdef FW_GCOV
+void __gcov_dump(void);
+void fw_counters_write(void) { __gcov_dump(); }
+#else
+void fw_counters_write(void) {}
+#endif

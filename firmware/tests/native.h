@@ -59,5 +59,6 @@ unsigned fw_ec_size(void);
 int fw_call(const char *name, unsigned index, unsigned data, int extended);  /* -1: no such call */
 int fw_call_is_legal(unsigned call);
 unsigned fw_list_next(const uint32_t list[2], unsigned from);
+void fw_counters_write(void);  /* coverage counters to disk, now; nothing without gcov */
 /* cffi end */
 #endif
