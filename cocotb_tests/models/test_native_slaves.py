@@ -356,7 +356,7 @@ def test_ab_data_exchange():
     assert (line.net.state(a).parameter, line.net.state(b).parameter) == (0b1011, 0b1111)
 
 
-# io code -> which of D3..D0 echo the output (section 4.4 prints D0 first)
+# io code -> which of D3..D0 echo the output (the table of IO codes prints D0 first)
 ECHO = {0: "IIII", 1: "IIIO", 2: "IIIB", 3: "IIOO", 4: "IIBB", 5: "IOOO", 6: "IBBB", 7: "BBBB", 8: "OOOO", 9: "OOOI",
         0xA: "OOOB", 0xB: "OOII", 0xC: "OOBB", 0xD: "OIII", 0xE: "OBBB", 0xF: "TTTT"}
 
@@ -576,7 +576,7 @@ def test_refused_arguments():
 
 
 # ------------------------------------------------------------------------------------------ worked examples, monitor
-EXAMPLES = [  # section 10: call, printed request word, printed grid (one character per 3 us)
+EXAMPLES = [  # the worked examples E1 to E11: call, printed request word, printed grid (one character per 3 us)
     (encode_call("DEXG", 5, 0b1010), 0x02A9, "-+-+-+-.+.-.+.-.+.-.+.-+-.+"),
     (encode_call("DEXG", 5, 0b0101), 0x0295, "-+-+-+-.+.-.+.-+-.+.-.+.-.+"),
     (encode_call("WPAR", 12, 0b0110), 0x065B, "-+-+-.+-+.-+-.+.-.+-+.-.+-+"),
