@@ -485,21 +485,21 @@ async def stopped_idle(dut):
 
 @cocotb.test(timeout_time=20, timeout_unit="ms")
 async def offered_later(dut):
-    """LT-004, LT-009: a request offered after the gap starts at once, one offered within it starts when the gap ends;
-    a foreign pulse on the idle line still costs 24 us of quiet."""
+    """LT-004, LT-009: a request offered within the gap starts when the gap ends, one offered after it when P_TX_BIAS has
+    passed; a foreign pulse on the idle line still costs 24 us of quiet."""
     tb = TB(dut)
     await tb.start()
     tb.offer()
     edge = await tb.request()
     last = await tb.good(edge, 2)
-    for offered, starts in ((10, 18.5), (18.375, 18.5), (18.5, 18.5), (100, 100)):
+    for offered, starts in ((10, 18.5), (18.375, 18.5), (18.5, 30.5), (100, 112)):
         await until(last + tb.us(offered))
         at = now()
         tb.offer()
         edge = await tb.request()
-        # a request offered in the very clock of the edge is one clock late, as any later one
-        assert edge == max(last + tb.us(starts), at + 1), (offered, edge - last)
-        assert tb.lead == max(0, edge - at - 1)
+        # bias and edge come one clock after the request
+        assert edge == last + tb.us(starts) + (starts > 18.5), (offered, edge - last)
+        assert tb.lead == min(edge - at - 1, tb.us(12))
         last = await tb.good(edge, 2)
     await wait(tb.us(100))
     await tb.pulse(now(), 1)

@@ -87,7 +87,7 @@ module asi_xact
   asi_pulse_filter #(.ClkHz(ClkHz), .FilterNs(FilterNs)) i_filter_p (.clk_i, .rst_i, .pulse_i(rx_p), .start_o(p_start));
   asi_pulse_filter #(.ClkHz(ClkHz), .FilterNs(FilterNs)) i_filter_n (.clk_i, .rst_i, .pulse_i(rx_n), .start_o(n_start));
   asi_tx #(.ClkHz(ClkHz), .HalfBitNs(HalfBitNs)) i_tx (
-    .clk_i, .rst_i, .start_i(start), .arm_i(armed_q && (open_q || req_valid_i)),
+    .clk_i, .rst_i, .start_i(start), .arm_i((armed_q || (state_q == StReady && enable_i)) && (open_q || req_valid_i)),
     .call_i(open_q ? call_q : req_call_i), .busy_o(tx_busy), .last_o(tx_last), .tx_man_o, .tx_en_o
   );
   asi_rx #(
@@ -103,7 +103,7 @@ module asi_xact
   assign gap        = quiet_wait || (state_q == StGapOk) || (state_q == StGapNorsp);
   assign reached    = time_q >= limit;
   assign babble_end = babble_q == BabbleW'(BabbleMax - 2);
-  assign can_start  = enable_i && (babble_end || (!pulse && (state_q == StReady || (gap && armed_q && reached))));
+  assign can_start  = enable_i && (babble_end || (!pulse && reached && (state_q == StReady || (gap && armed_q))));
   assign req_ready_o = can_start && !open_q;
   assign start       = can_start && (open_q || req_valid_i);
   assign sent_o      = start;
@@ -118,6 +118,7 @@ module asi_xact
       StGapNorsp: limit = gap_limit(GapNorsp, armed_q);
       StGapErr:   limit = gap_limit(GapErr, armed_q);
       StIdle:     limit = gap_limit(IdleStart, armed_q);
+      StReady:    limit = TimeW'(Bias);
       default:    limit = '0;
     endcase
   end
@@ -132,8 +133,10 @@ module asi_xact
         time_d = '0;
         if (enable_i && !tx_busy) state_d = StIdle;
       end
-      // StIdle: P_IDLE_START of quiet after StOff.  StReady: nothing to wait for but a request
-      StIdle, StReady: ;
+      // StIdle: P_IDLE_START of quiet after StOff
+      StIdle: ;
+      // StReady: nothing to wait for but a request; it is given the whole P_TX_BIAS
+      StReady: if (!req_valid_i && !pulse) time_d = '0;
       // StTx: own request; the last edge is the anchor of the next four states
       StTx: begin
         time_d = TimeW'(tx_last);
