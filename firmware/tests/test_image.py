@@ -198,6 +198,31 @@ def test_data_exchange_off():
     assert chip.slaves[0].outputs == 15 and chip.read("PHASE") == 3
 
 
+@pytest.mark.parametrize("stop", ["offline", "power", "data_exchange"])
+def test_first_cycle_sends_present_outputs(stop):
+    """LK-006, EX-001, EX-024: outputs that the host took back while nothing was exchanged are never sent again, not
+    even in the first cycle."""
+    chip = Chip(network()).start()
+    chip.write("OUT_IMG", 0xFFFFFFFF)
+    for _ in range(3):
+        chip.cycle()
+    assert chip.slaves[0].outputs == 0
+    if stop == "power":
+        chip.power(True)
+    else:
+        assert chip.commit(offline=stop == "offline", data_exchange=stop != "data_exchange") == 0
+    for _ in range(3):
+        chip.step()
+    chip.log.clear()
+    chip.write("OUT_IMG", 0)
+    if stop == "power":
+        chip.power(False)
+    else:
+        assert chip.commit() == 0
+    chip.until(lambda: sum(call >> 4 == 1 << 1 for call, *_ in chip.log) > 4)  # DEXG to slave 1
+    assert {call & 15 for call, *_ in chip.log if call >> 4 == 1 << 1} == {15}
+
+
 def awake(chip, steps):
     """Longest time awake in so many steps, us at 16 MHz."""
     chip.r.awake_max = 0
