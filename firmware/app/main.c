@@ -42,6 +42,7 @@ void asi_interrupt(void)
     /* outside running cycles a change of phase, flags or lists is news enough */
     if (publish || (asi_ec_state(&ec)->phase != ASI_PHASE_DATA_EXCHANGE && asi_window_is_stale(&ec)))
         asi_window_publish(&ec);
+    hal_leave_time();
 }
 
 int main(void)

@@ -181,9 +181,19 @@ void hal_host_interrupt(void)
     REG(HOST_IRQ) = 1;
 }
 
+void hal_leave_time(void)
+{
+    if (REG(EVENT) & HAL_CYCLE_DONE)
+        REG(EVENT_EN) = HAL_ALL_EVENTS & ~HAL_CYCLE_DONE;
+}
+
 void hal_sleep(void)
 {
-    (void)REG(WAIT);
+    hal_irq_off(); /* hal_leave_time may not come between the question and WAIT; WAIT ends without the interrupt too */
+    if (REG(EVENT_EN) == HAL_ALL_EVENTS)
+        (void)REG(WAIT);
+    REG(EVENT_EN) = HAL_ALL_EVENTS;
+    hal_irq_on();
 }
 
 extern uint32_t _stack_guard[]; /* firmware.ld; startup.S writes the pattern */

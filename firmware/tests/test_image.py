@@ -128,6 +128,20 @@ def test_commit_is_applied_once():
     assert chip.read("FW_SEQ") == 2 and chip.list("LPS") == {1, 2} and chip.read("FW_RESULT") == 0
 
 
+def test_commit_while_cycles_never_wait():
+    """HW-002, HW-004: cycles that end faster than they are served (one slave, 8 MHz) cannot keep a commit out, and
+    are still published."""
+    chip = Chip(network()[:1]).start()
+    chip.write("LPS_CFG", 0b10)
+    chip.write("HOST_SEQ", 1)
+    chip.r.event |= 1 << 5
+    irqs = chip.r.host_irqs
+    for _ in range(200):
+        chip.r.event |= 1
+        chip.lib.soc_clocks(250)
+    assert chip.read("FW_SEQ") == 1 and chip.list("LPS") == {1} and chip.r.host_irqs - irqs > 10
+
+
 def test_parameters_from_commit_before_start():
     """EX-002, CA-002: PP committed before the settle time is over becomes PI and reaches the slave."""
     chip = Chip(network()).run()
