@@ -444,10 +444,12 @@ static void candidate_read(asi_ec_t *ec)
         run_cycle(ec); /* LAS may have become empty (EX-026) */
         update_flags(ec);
     }
-    if (may_activate(ec, i))
+    if (may_activate(ec, i)) {
+        asi_port_forget(i); /* it may have been active before */
         inclusion_request(ec, INCLUDE_WPAR);
-    else
+    } else {
         probe_next(ec);
+    }
 }
 
 static void inclusion_result(asi_ec_t *ec, const asi_result_t *result)

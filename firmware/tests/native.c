@@ -54,6 +54,14 @@ void asi_port_slot(unsigned index, bool active, bool extended)
     port.extended[index] = extended;
 }
 
+void asi_port_forget(unsigned index)
+{
+    if (index >= 64 || port.active[index])
+        port.violations++;
+    else
+        port.forgotten[index] = 1;
+}
+
 void asi_port_management(const asi_request_t *request)
 {
     if (port.managements && request->tag == port.management.tag)

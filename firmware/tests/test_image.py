@@ -165,6 +165,32 @@ def test_slave_comes_and_goes():
     assert chip.nibble("IN_IMG", 1) == 5 and chip.item("CDI", 1, 2) == gone.codes
 
 
+def test_inputs_of_an_earlier_activation():
+    """CA-006, EX-009, LK-005: a slave that the projection put out and lets in again never shows its old inputs; its
+    neighbours in the image keep theirs."""
+    chip = Chip(network() + [Slave(3, inputs=6)]).start()
+    for s in chip.slaves:
+        chip.put("PCD", s.index, 2, s.codes)
+    chip.write("LPS_CFG", 0b1110)
+    chip.write("LPS_CFG", 0b100, 1)
+    assert chip.commit(protected_mode=1) == 0
+    chip.until(lambda: chip.nibble("IN_IMG", 1) == 5)
+    chip.write("LPS_CFG", 0b1100)
+    assert chip.commit(protected_mode=1) == 0
+    assert chip.list("LAS") == {2, 3, 34}
+    for _ in range(5):
+        chip.cycle()
+    chip.slaves[0].inputs = 9
+    chip.write("LPS_CFG", 0b1110)
+    assert chip.commit(protected_mode=1) == 0
+    seen = []
+    while len(seen) < 500 and seen[-1:] != [9]:
+        chip.cycle()
+        seen.append(chip.nibble("IN_IMG", 1))
+        assert [chip.nibble("IN_IMG", i) for i in (2, 3, 34)] == [9, 6, 3]
+    assert set(seen) == {0, 9}
+
+
 @pytest.mark.parametrize("phase", [1, 3])
 def test_power_fail(phase):
     """EX-001, EX-021, HW-004: APF stops the line at once and shows; the line comes back afterwards."""
