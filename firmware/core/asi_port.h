@@ -44,6 +44,6 @@ void asi_port_management(const asi_request_t *request);
 void asi_port_inclusion(const asi_request_t *request);
 /** Output nibbles at line level, taken at the start of a cycle, all or nothing. */
 void asi_port_outputs(const uint32_t image[ASI_IMAGE_WORDS]);
-/** Phase to show outside running cycles. */
+/** Phase to show outside running cycles. OFFLINE only with the line off. */
 void asi_port_phase(asi_phase_t phase);
 #endif

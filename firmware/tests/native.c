@@ -85,7 +85,12 @@ void asi_port_outputs(const uint32_t image[ASI_IMAGE_WORDS])
     memcpy(port.out, image, sizeof port.out);
 }
 
-void asi_port_phase(asi_phase_t phase) { port.phase = (uint8_t)phase; }
+void asi_port_phase(asi_phase_t phase)
+{
+    if (phase == ASI_PHASE_OFFLINE && port.line) /* a telegram could start */
+        port.violations++;
+    port.phase = (uint8_t)phase;
+}
 
 /* ---- flat interface */
 fw_port *fw_port_record(void) { return &port; }
