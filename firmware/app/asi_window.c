@@ -110,6 +110,7 @@ bool asi_window_serve(asi_ec_t *ec)
         in_use = next;
         asi_ec_set_offline(ec, (controls & HOST_CTRL_R__OFFLINE_bm) != 0u);
         asi_ec_set_mode(ec, (controls & HOST_CTRL_R__PROTECTED_MODE_bm) != 0u);
+        asi_window_take_outputs(ec); /* data exchange may begin */
         asi_ec_set_data_exchange(ec, (controls & HOST_CTRL_R__DATA_EXCHANGE_bm) != 0u);
         asi_ec_set_auto_address(ec, (controls & HOST_CTRL_R__AUTO_ADDRESS_ENABLE_bm) != 0u);
         asi_window_publish(ec);

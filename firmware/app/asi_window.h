@@ -16,7 +16,7 @@
 const asi_projection_t *asi_window_init(void);
 /** Publish the first state and write MAGIC, last (HW-001). */
 void asi_window_open(asi_ec_t *ec);
-/** Output image of the host to the core. Interrupt. */
+/** Output image of the host to the core. Interrupt, or masked. */
 void asi_window_take_outputs(asi_ec_t *ec);
 /** Publish all, then raise host_irq_o once. Interrupt, or masked. */
 void asi_window_publish(asi_ec_t *ec);

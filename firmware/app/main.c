@@ -19,6 +19,7 @@ void asi_interrupt(void)
     if (events & HAL_BATCH_DONE) {
         const asi_result_t *results;
         const unsigned n = hal_batch_results(&results);
+        asi_window_take_outputs(&ec); /* the first cycle may follow: it sends what the host wants now, not what it did */
         (void)asi_ec_batch_done(&ec, results, n); /* refused: a batch that was given up */
     }
     if (events & HAL_SLAVE_LOST) {
@@ -41,6 +42,7 @@ void asi_interrupt(void)
     /* outside running cycles a change of phase, flags or lists is news enough */
     if (publish || (asi_ec_state(&ec)->phase != ASI_PHASE_DATA_EXCHANGE && asi_window_is_stale(&ec)))
         asi_window_publish(&ec);
+    hal_leave_time();
 }
 
 int main(void)

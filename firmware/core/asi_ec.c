@@ -201,6 +201,8 @@ static void dispatch(asi_ec_t *ec, event_t event)
         for (unsigned row = 0; row < sizeof transitions / sizeof transitions[0]; row++) {
             if (transitions[row].phase == ec->state.phase && transitions[row].event == event) {
                 if (transitions[row].next != ec->state.phase) {
+                    if (transitions[row].next == ASI_PHASE_OFFLINE)
+                        asi_port_line(false); /* EX-001: before the phase is shown */
                     ec->state.phase = transitions[row].next;
                     asi_port_phase(ec->state.phase);
                     touch(ec);
@@ -216,7 +218,6 @@ static void dispatch(asi_ec_t *ec, event_t event)
 /** EX-001 */
 static event_t go_offline(asi_ec_t *ec)
 {
-    asi_port_line(false);
     asi_port_cycle(false, false, 0);
     asi_port_inclusion(0);
     for (unsigned i = asi_list_next(&ec->state.las, 0u); i < ASI_INDICES; i = asi_list_next(&ec->state.las, i + 1u))
@@ -444,10 +445,12 @@ static void candidate_read(asi_ec_t *ec)
         run_cycle(ec); /* LAS may have become empty (EX-026) */
         update_flags(ec);
     }
-    if (may_activate(ec, i))
+    if (may_activate(ec, i)) {
+        asi_port_forget(i); /* it may have been active before */
         inclusion_request(ec, INCLUDE_WPAR);
-    else
+    } else {
         probe_next(ec);
+    }
 }
 
 static void inclusion_result(asi_ec_t *ec, const asi_result_t *result)

@@ -36,12 +36,14 @@ void asi_port_batch(const asi_request_t *requests, unsigned n);
 void asi_port_cycle(bool run, bool two_extra, uint16_t min_cycle_us);
 /** Call this index in the cycle, or not. extended: I3 of the call is ~Sel. */
 void asi_port_slot(unsigned index, bool active, bool extended);
+/** Inputs of an index that has not been called for a cycle become 0 in the reports of later cycles. */
+void asi_port_forget(unsigned index);
 /** One call for the next management slot; only when the last one has been reported. */
 void asi_port_management(const asi_request_t *request);
 /** The call of all inclusion slots from now on; NULL: none. */
 void asi_port_inclusion(const asi_request_t *request);
 /** Output nibbles at line level, taken at the start of a cycle, all or nothing. */
 void asi_port_outputs(const uint32_t image[ASI_IMAGE_WORDS]);
-/** Phase to show outside running cycles. */
+/** Phase to show outside running cycles. OFFLINE only with the line off. */
 void asi_port_phase(asi_phase_t phase);
 #endif

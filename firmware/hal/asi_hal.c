@@ -78,6 +78,30 @@ void asi_port_slot(unsigned index, bool active, bool extended)
     LINK(SLOT)[index] = (active ? SLOT_R__ACTIVE_bm : 0u) | (extended ? SLOT_R__EXTENDED_bm : 0u);
 }
 
+/** Inputs of a word of slots as they should stand in IN_WORK: last answers of the slots that are called. */
+static uint32_t inputs_of(unsigned word)
+{
+    uint32_t inputs = 0;
+    for (unsigned i = 8u * word; i < 8u * word + 8u; i++) {
+        const uint32_t state = asi_list_has(&slots, i) ? LINK(SLOT_STATE)[i] : 0u;
+        if ((state & SLOT_STATE_R__STREAK_bm) >> SLOT_STATE_R__STREAK_bp < ASI_FAIL_CYCLES)
+            inputs |= (state & SLOT_STATE_R__DATA_bm) << asi_shift(i);
+    }
+    return inputs;
+}
+
+/** The sequencer keeps the nibble of a slot that was switched off (LK-005). It writes the neighbours while we do, but
+ * SLOT_STATE and IN_WORK without a free clock between: what holds after our write was written. */
+void asi_port_forget(unsigned index)
+{
+    uint32_t inputs = inputs_of(asi_word(index)), written;
+    do {
+        written = inputs;
+        LINK(IN_WORK)[asi_word(index)] = written;
+        inputs = inputs_of(asi_word(index));
+    } while (inputs != written); /* once more at most: a call takes longer */
+}
+
 void asi_port_management(const asi_request_t *request)
 {
     LINK(MGMT_REQ)[0] = request_word(request);
@@ -181,9 +205,19 @@ void hal_host_interrupt(void)
     REG(HOST_IRQ) = 1;
 }
 
+void hal_leave_time(void)
+{
+    if (REG(EVENT) & HAL_CYCLE_DONE)
+        REG(EVENT_EN) = HAL_ALL_EVENTS & ~HAL_CYCLE_DONE;
+}
+
 void hal_sleep(void)
 {
-    (void)REG(WAIT);
+    hal_irq_off(); /* hal_leave_time may not come between the question and WAIT; WAIT ends without the interrupt too */
+    if (REG(EVENT_EN) == HAL_ALL_EVENTS)
+        (void)REG(WAIT);
+    REG(EVENT_EN) = HAL_ALL_EVENTS;
+    hal_irq_on();
 }
 
 extern uint32_t _stack_guard[]; /* firmware.ld; startup.S writes the pattern */

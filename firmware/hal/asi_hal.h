@@ -42,7 +42,11 @@ uint32_t hal_time_us(void);
 hal_counters_t hal_counters(void);
 /** Raise the host's interrupt. */
 void hal_host_interrupt(void);
-/** Sleep until an event is pending; with the interrupt open it has been served when this returns. */
+/** End of the interrupt: when the next cycle has ended already, it waits until the main loop has been round once, so
+ * that the shortest cycles on the slowest clock do not keep the host's commits from being served (HW-002). */
+void hal_leave_time(void);
+/** Sleep until an event is pending, and let it be served; when a cycle waits for the main loop, only the latter.
+ * Main loop, with the interrupt open. */
 void hal_sleep(void);
 /** False when the stack has run over its guard. */
 bool hal_stack_intact(void);

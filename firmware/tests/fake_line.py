@@ -155,6 +155,9 @@ class Master:
         p, lost = self.port, []
         if not p.cycle:
             return False
+        for index in range(64):
+            if p.forgotten[index]:
+                self.in_work[index] = p.forgotten[index] = 0
         out = list(p.out)
         for number in range(1, 32):
             a, b = (p.active[i] and self.state_streak[i] < FAIL_CYCLES for i in (number, number + 32))

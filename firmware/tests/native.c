@@ -54,6 +54,14 @@ void asi_port_slot(unsigned index, bool active, bool extended)
     port.extended[index] = extended;
 }
 
+void asi_port_forget(unsigned index)
+{
+    if (index >= 64 || port.active[index])
+        port.violations++;
+    else
+        port.forgotten[index] = 1;
+}
+
 void asi_port_management(const asi_request_t *request)
 {
     if (port.managements && request->tag == port.management.tag)
@@ -77,7 +85,12 @@ void asi_port_outputs(const uint32_t image[ASI_IMAGE_WORDS])
     memcpy(port.out, image, sizeof port.out);
 }
 
-void asi_port_phase(asi_phase_t phase) { port.phase = (uint8_t)phase; }
+void asi_port_phase(asi_phase_t phase)
+{
+    if (phase == ASI_PHASE_OFFLINE && port.line) /* a telegram could start */
+        port.violations++;
+    port.phase = (uint8_t)phase;
+}
 
 /* ---- flat interface */
 fw_port *fw_port_record(void) { return &port; }

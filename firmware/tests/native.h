@@ -18,6 +18,7 @@ typedef struct {
     uint8_t batch_len;
     fw_request batch[64];
     uint8_t active[64], extended[64];
+    uint8_t forgotten[64];        /* set by asi_port_forget, cleared by the test */
     uint32_t managements;         /* counts asi_port_management */
     fw_request management;
     uint8_t inclusion_valid;

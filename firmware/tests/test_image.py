@@ -128,6 +128,20 @@ def test_commit_is_applied_once():
     assert chip.read("FW_SEQ") == 2 and chip.list("LPS") == {1, 2} and chip.read("FW_RESULT") == 0
 
 
+def test_commit_while_cycles_never_wait():
+    """HW-002, HW-004: cycles that end faster than they are served (one slave, 8 MHz) cannot keep a commit out, and
+    are still published."""
+    chip = Chip(network()[:1]).start()
+    chip.write("LPS_CFG", 0b10)
+    chip.write("HOST_SEQ", 1)
+    chip.r.event |= 1 << 5
+    irqs = chip.r.host_irqs
+    for _ in range(200):
+        chip.r.event |= 1
+        chip.lib.soc_clocks(250)
+    assert chip.read("FW_SEQ") == 1 and chip.list("LPS") == {1} and chip.r.host_irqs - irqs > 10
+
+
 def test_parameters_from_commit_before_start():
     """EX-002, CA-002: PP committed before the settle time is over becomes PI and reaches the slave."""
     chip = Chip(network()).run()
@@ -149,6 +163,32 @@ def test_slave_comes_and_goes():
     chip.until(lambda: 1 in chip.list("LAS"), 80)
     chip.cycle()
     assert chip.nibble("IN_IMG", 1) == 5 and chip.item("CDI", 1, 2) == gone.codes
+
+
+def test_inputs_of_an_earlier_activation():
+    """CA-006, EX-009, LK-005: a slave that the projection put out and lets in again never shows its old inputs; its
+    neighbours in the image keep theirs."""
+    chip = Chip(network() + [Slave(3, inputs=6)]).start()
+    for s in chip.slaves:
+        chip.put("PCD", s.index, 2, s.codes)
+    chip.write("LPS_CFG", 0b1110)
+    chip.write("LPS_CFG", 0b100, 1)
+    assert chip.commit(protected_mode=1) == 0
+    chip.until(lambda: chip.nibble("IN_IMG", 1) == 5)
+    chip.write("LPS_CFG", 0b1100)
+    assert chip.commit(protected_mode=1) == 0
+    assert chip.list("LAS") == {2, 3, 34}
+    for _ in range(5):
+        chip.cycle()
+    chip.slaves[0].inputs = 9
+    chip.write("LPS_CFG", 0b1110)
+    assert chip.commit(protected_mode=1) == 0
+    seen = []
+    while len(seen) < 500 and seen[-1:] != [9]:
+        chip.cycle()
+        seen.append(chip.nibble("IN_IMG", 1))
+        assert [chip.nibble("IN_IMG", i) for i in (2, 3, 34)] == [9, 6, 3]
+    assert set(seen) == {0, 9}
 
 
 @pytest.mark.parametrize("phase", [1, 3])
@@ -196,6 +236,31 @@ def test_data_exchange_off():
     for _ in range(2):
         chip.cycle()
     assert chip.slaves[0].outputs == 15 and chip.read("PHASE") == 3
+
+
+@pytest.mark.parametrize("stop", ["offline", "power", "data_exchange"])
+def test_first_cycle_sends_present_outputs(stop):
+    """LK-006, EX-001, EX-024: outputs that the host took back while nothing was exchanged are never sent again, not
+    even in the first cycle."""
+    chip = Chip(network()).start()
+    chip.write("OUT_IMG", 0xFFFFFFFF)
+    for _ in range(3):
+        chip.cycle()
+    assert chip.slaves[0].outputs == 0
+    if stop == "power":
+        chip.power(True)
+    else:
+        assert chip.commit(offline=stop == "offline", data_exchange=stop != "data_exchange") == 0
+    for _ in range(3):
+        chip.step()
+    chip.log.clear()
+    chip.write("OUT_IMG", 0)
+    if stop == "power":
+        chip.power(False)
+    else:
+        assert chip.commit() == 0
+    chip.until(lambda: sum(call >> 4 == 1 << 1 for call, *_ in chip.log) > 4)  # DEXG to slave 1
+    assert {call & 15 for call, *_ in chip.log if call >> 4 == 1 << 1} == {15}
 
 
 def awake(chip, steps):

@@ -39,8 +39,20 @@ def test_inputs_of_one_cycle():
     assert HostWindow(memory).inputs() == [15] * 64
 
 
+def test_inputs_during_a_long_publication():
+    """HW-003: a publication with the codes of 62 slaves outlasts thousands of reads; its end is waited for."""
+    memory = Memory()
+    memory.words.update({regmap.HOST_IN_SEQ: 7, regmap.HOST_IN_IMG: 5})
+    memory.script = lambda m, addr: m.words.update({regmap.HOST_IN_SEQ: 7 + (m.reads > 4_000)})
+    assert HostWindow(memory).inputs()[0] == 5
+
+
 def test_inputs_never_consistent():
-    """HW-003: an image that never holds still is an error, not a guess."""
+    """HW-003: an image that never holds still, or is being written for ever, is an error, not a guess."""
+    memory = Memory()
+    memory.words[regmap.HOST_IN_SEQ] = 1
+    with pytest.raises(WindowError):
+        HostWindow(memory).inputs()
     memory = Memory()
     memory.script = lambda m, addr: m.words.update({regmap.HOST_IN_SEQ: m.words.get(regmap.HOST_IN_SEQ, 0) + 2})
     with pytest.raises(WindowError):
