@@ -3,6 +3,9 @@
 SHELL  := /bin/bash
 VENV   ?= .venv
 BUILD  := build
+ifneq ($(words $(CURDIR)),1)
+$(error the path of this folder has a space, which make cannot handle: move the clone: $(CURDIR))
+endif
 PYTHON ?= python3
 VPY    := $(VENV)/bin/python
 
@@ -14,7 +17,7 @@ export PYTHONPATH := $(CURDIR)/host/python:$(CURDIR)
 
 # a machine with c++ or clang++ but no g++, which Verilator's makefiles ask for
 ifeq ($(shell command -v g++),)
-CXX := $(notdir $(shell command -v c++ || command -v clang++))
+CXX := $(or $(notdir $(shell command -v c++ || command -v clang++)),no-c++-compiler)
 MAKEFLAGS += CXX=$(CXX)
 endif
 
@@ -85,10 +88,14 @@ test: $(VENV)/.ready  ## everything, with one closing line of counts; JUnit and 
 # ---------------------------------------------------------------- run
 PLANT ?= sim/plants/packaging.toml
 RUN_LIB = $(BUILD)/tb/libasi_chip$(if $(filter 1,$(WAVES)),_trace).so
-.PHONY: run
+$(foreach v,WAVES QUICK,$(if $(filter-out 0 1,$($v)),$(error $v=$($v): must be 0 or 1)))
+.PHONY: run check
 run: $(VENV)/.ready $(RUN_LIB) $(BUILD)/firmware/asi.hex $(BUILD)/firmware/asi_test.hex  ## run a plant: make run PLANT=... TIME=500ms WAVES=1 QUICK=0
-	@$(VPY) -m asi run $(PLANT) $(if $(TIME),--time $(TIME)) $(if $(filter 1,$(WAVES)),--waves) \
+	@$(VPY) -m asi run "$(PLANT)" $(if $(TIME),--time $(TIME)) $(if $(filter 1,$(WAVES)),--waves) \
 	  $(if $(filter 1,$(QUICK)),--quick) $(if $(filter 0,$(QUICK)),--no-quick) $(RUN_ARGS)
+
+check: $(VENV)/.ready  ## check a plant file without running it: make check PLANT=...
+	@$(VPY) -m asi check "$(PLANT)"
 
 # ---------------------------------------------------------------- requirement matrix, waveform view
 .PHONY: matrix

@@ -8,6 +8,7 @@ usage: gen_registers.py [--check] [--html DIR]
 """
 import argparse
 import filecmp
+import shutil
 import sys
 import tempfile
 from pathlib import Path
@@ -137,14 +138,16 @@ def main():
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--html", type=Path)
     args = parser.parse_args()
-    if not args.check:
-        generate(ROOT, args.html)
-        return 0
     with tempfile.TemporaryDirectory() as tmp:
         tmp = Path(tmp)
         stale = [p.relative_to(tmp) for p in generate(tmp, args.html)
                  if not (ROOT / p.relative_to(tmp)).exists()
                  or not filecmp.cmp(p, ROOT / p.relative_to(tmp), shallow=False)]
+        if not args.check:  # only what differs, so that nothing else is built again
+            for path in stale:
+                (ROOT / path).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(tmp / path, ROOT / path)
+            return 0
     for path in stale:
         print(f"stale: {path}: run 'make regs' and commit", file=sys.stderr)
     return 1 if stale else 0

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The runner, report, logs and command line, on a fake chip (fake_bench.py)."""
+import fcntl
 import json
+import os
 import re
 from io import StringIO
 from pathlib import Path
@@ -463,3 +465,17 @@ def test_long_runs_do_not_grow(tmp_path):
     bench.telegrams = telegrams
     Runner(small(), bench, tmp_path, until_ns=3_000_000_000, log=False).run()
     assert max(sizes) <= 80 and sum(sizes) > 15_000  # 10 ms of line are 65 telegrams
+
+
+def test_one_run_per_folder(asi, tmp_path):
+    """PL-002: a second run in the same folder is refused in one line, and waves of an earlier run do not stay."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / "waves.fst").write_text("old")
+    other = os.open(folder, os.O_RDONLY)
+    fcntl.flock(other, fcntl.LOCK_EX)
+    code, _, err = asi("run", written(tmp_path), "--time", "60ms")
+    assert code == 2 and err.count("\n") == 1 and "another run" in err
+    os.close(other)
+    assert asi("run", written(tmp_path), "--time", "60ms")[0] == 0
+    assert not (folder / "waves.fst").exists()

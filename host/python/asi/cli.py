@@ -4,7 +4,11 @@
 Exit codes: 0 everything as the plant expects, 1 an expectation was not met, 2 bad input (plant, option),
 3 the simulation failed, 130 stopped by Ctrl-C (the report so far is written).
 """
+import fcntl
+import os
 import time as clock
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -49,6 +53,19 @@ def _load(path: Path) -> Plant:
 def _fail(text: str, code: int) -> typer.Exit:
     typer.echo(text, err=True)
     return typer.Exit(code)
+
+
+@contextmanager
+def _only_run(out: Path) -> Iterator[None]:
+    """Hold the output folder: two runs in one would mix their logs."""
+    folder = os.open(out, os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError:
+        raise _fail(f"{out}: another run writes there; give this one another folder with --out", BAD_INPUT) from None
+    finally:
+        os.close(folder)
 
 
 class _Lines:
@@ -129,37 +146,40 @@ def run(
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _fail(f"{out}: {error.strerror}", BAD_INPUT) from None
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console = Console(highlight=False, width=120)  # a file or a pipe has no width of its own
-    console.print(Text(" ".join(described.description.split()), style="dim"))
-    if quick and not chosen:
-        console.print("note: the wait after power-up is 20 ms instead of 1 s in this run (--no-quick, QUICK=0 keeps it)")
-    if until_ns <= settle_ns:
-        console.print(f"note: the line stays quiet until {report.ms(settle_ns)}, the wait after power-up")
-    wave_path = out / "waves.part" if waves else None
-    image = firmware or FIRMWARE / ("asi_test.hex" if quick else "asi.hex")
-    files = ["report.json", *(["telegrams.log", "telegrams.jsonl"] if log else [])]
-    try:
-        bench = open_bench(image, wave_path, described.seed)
-    except BenchError as error:
-        raise _fail(f"simulation: {error}", FAILED) from None
-    try:
-        with (_Bar if console.is_terminal else _Lines)(console) as progress:
-            result = Runner(described, bench, out, until_ns, log=log, progress=progress).run()
-        bench.close()
-        if wave_path is not None:
-            files.append(name_waves(wave_path).name)
-    except OSError as error:
-        raise _fail(f"{out}: {error.strerror}", FAILED) from None
-    report.show(result, console)
-    console.print(Text(f"written: {', '.join(str(out / name) for name in files)}", style="dim"), soft_wrap=True)
-    for check in result["checks"]:
-        for difference in check["differences"]:
-            typer.echo(f"not met: {check['name']} at {report.ms(check['at_ns'])}: {difference}", err=True)
-    if result["error"]:
-        typer.echo(f"simulation: {result['error']}", err=True)
-    raise typer.Exit(EXIT_CODES[result["result"]])
+    with _only_run(out):
+        console = Console(highlight=False)
+        if not console.is_terminal:
+            console = Console(highlight=False, width=120)  # a file or a pipe has no width of its own
+        console.print(Text(" ".join(described.description.split()), style="dim"))
+        if quick and not chosen:
+            console.print("note: the wait after power-up is 20 ms instead of 1 s in this run; --no-quick, QUICK=0 keep it")
+        if until_ns <= settle_ns:
+            console.print(f"note: the line stays quiet until {report.ms(settle_ns)}, the wait after power-up")
+        wave_path = out / "waves.part" if waves else None
+        image = firmware or FIRMWARE / ("asi_test.hex" if quick else "asi.hex")
+        files = ["report.json", *(["telegrams.log", "telegrams.jsonl"] if log else [])]
+        try:
+            bench = open_bench(image, wave_path, described.seed)
+        except BenchError as error:
+            raise _fail(f"simulation: {error}", FAILED) from None
+        try:
+            for old in ("waves.fst", "waves.vcd"):
+                (out / old).unlink(missing_ok=True)  # never the waves of another run beside this report
+            with (_Bar if console.is_terminal else _Lines)(console) as progress:
+                result = Runner(described, bench, out, until_ns, log=log, progress=progress).run()
+            bench.close()
+            if wave_path is not None:
+                files.append(name_waves(wave_path).name)
+        except OSError as error:
+            raise _fail(f"{out}: {error.strerror}", FAILED) from None
+        report.show(result, console)
+        console.print(Text(f"written: {', '.join(str(out / name) for name in files)}", style="dim"), soft_wrap=True)
+        for check in result["checks"]:
+            for difference in check["differences"]:
+                typer.echo(f"not met: {check['name']} at {report.ms(check['at_ns'])}: {difference}", err=True)
+        if result["error"]:
+            typer.echo(f"simulation: {result['error']}", err=True)
+        raise typer.Exit(EXIT_CODES[result["result"]])
 
 
 @app.command()

@@ -204,6 +204,8 @@ def render(report: dict[str, Any]) -> Group:
     style = {"ok": "green", "interrupted": "yellow"}.get(report["result"], "red")
     ratio = "-" if run["real_time_ratio"] is None else f"{run['real_time_ratio']:.2f} x real time"
     title = Text.assemble((report["plant"]["name"], "bold"), "  ", (report["result"].upper(), f"bold {style}"))
+    if unreached := sum(check["result"] == "not reached" for check in report["checks"]):
+        title.append(f"  {unreached} of {len(report['checks'])} checks not reached", style="yellow")
     head = _pairs([
         ("bus time", f"{ms(run['bus_time_ns'])} in {run['wall_s']:.1f} s ({ratio}), "
                      f"{run['clocks']} clocks at {run['clk_hz'] / 1e6:g} MHz"),
