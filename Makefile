@@ -113,4 +113,4 @@ figures: $(BUILD)/tb/libasi_chip.so firmware synth  ## measure the published fig
 
 .PHONY: screenshot
 screenshot:  ## docs/images/waves.png from build/run/waves.fst (needs gtkwave, Xvfb, ImageMagick)
-	@bash tools/screenshot.sh $(BUILD)/run/waves.fst docs/images/waves.png 100000000 100620000
+	@bash tools/screenshot.sh $(BUILD)/run/waves.fst docs/images/waves.png

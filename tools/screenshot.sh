@@ -1,23 +1,19 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Picture of the waveform view: GTKWave with sim/views/asi.gtkw under a virtual display.
-# usage: screenshot.sh WAVES.fst OUT.png [START END]   times in ns of bus time
+# usage: screenshot.sh WAVES.fst OUT.png
 # Needs gtkwave, Xvfb and ImageMagick (Debian: gtkwave xvfb imagemagick).
 set -euo pipefail
-waves=$1 out=$2 start=${3:-100000000} end=${4:-100500000}
+waves=$1 out=$2
 cd "$(dirname "$0")/.."
 for program in gtkwave Xvfb import; do
   command -v "$program" >/dev/null || { echo "screenshot: $program is missing (Debian: gtkwave xvfb imagemagick)" >&2; exit 1; }
 done
 work=$(mktemp -d)
 trap 'kill $(jobs -p) 2>/dev/null; rm -rf "$work"' EXIT
-cat >"$work/view.tcl" <<TCL
-gtkwave::setZoomRangeTimes ${start}ns ${end}ns
-gtkwave::nop
-TCL
 printf 'use_maxtime_display 0\nhide_sst 1\nsplash_disable 1\n' >"$work/rc"
 Xvfb :87 -screen 0 1400x660x24 >/dev/null 2>&1 &
 sleep 1
-DISPLAY=:87 gtkwave --rcfile "$work/rc" --script "$work/view.tcl" "$waves" sim/views/asi.gtkw >/dev/null 2>&1 &
+DISPLAY=:87 gtkwave --rcfile "$work/rc" "$waves" sim/views/asi.gtkw >/dev/null 2>&1 &
 sleep 6
 DISPLAY=:87 import -window root -trim "$out"
