@@ -6,12 +6,12 @@ the slaves. Times of the line are ns since the pins were coupled; fractions come
 """
 import cocotb
 from asi import regmap
+from asi.monitor import Monitor
 from asi.window import COUNTERS, State
 from cocotb.triggers import Event, FallingEdge, RisingEdge, Timer
 from cocotb.utils import get_sim_time
 
 from .line import Line
-from .monitor import Monitor
 from .slaves import SlaveNetwork
 
 MASTER = "master"

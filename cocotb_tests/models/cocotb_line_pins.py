@@ -3,13 +3,13 @@
 import random
 
 import cocotb
+from asi.monitor import Monitor
 from asi.regmap import ErrorClass
 from asi.telegram import encode_call, pulses, request_pulses, response_word
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, RisingEdge, Timer
 
 from cocotb_tests.models.chip import MASTER, LinePins
-from cocotb_tests.models.monitor import Monitor
 from cocotb_tests.models.slaves import POWER_UP_NS, Slave, SlaveNetwork
 
 

@@ -5,7 +5,8 @@ Independent of the native slaves (tb/) on purpose; SL-007 compares the two. Time
 """
 from random import Random
 
-from .checks import HALF_BIT_NS, QUIET_ASYNC_NS, QUIET_NS, REQUEST_BITS, RequestCollector, WIN_LATE_NS, end_ns
+from asi.checks import HALF_BIT_NS, QUIET_ASYNC_NS, QUIET_NS, REQUEST_BITS, RequestCollector, WIN_LATE_NS, end_ns
+
 from .faults import Faults
 
 ANSWER_SYNC_NS = 21_500         # last request pulse to first answer pulse

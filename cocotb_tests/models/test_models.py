@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Python models against the rules of the line. No simulator."""
 import pytest
+from asi.checks import ANSWER_BITS, RequestCollector, classify, window
+from asi.monitor import Monitor
 from asi.regmap import ErrorClass
 from asi.telegram import encode_call, pulses, request_pulses, request_word, response_pulses, response_word
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cocotb_tests.models.checks import ANSWER_BITS, RequestCollector, classify, window
 from cocotb_tests.models.faults import Faults
 from cocotb_tests.models.line import Line
-from cocotb_tests.models.monitor import Monitor
 from cocotb_tests.models.slaves import (OUTPUT_ONLY, POWER_UP_NS, RESET_NS, WATCHDOG_NS, WRITE_NS, Slave, SlaveNetwork)
 
 MS = 1_000_000

@@ -2,9 +2,8 @@
 """Passive monitor: turns the pulses of a line into one record per call, whoever sent them. Times in ns."""
 from dataclasses import dataclass
 
+from asi.checks import ANSWER_BITS, QUIET_NS, REQUEST_BITS, WIN_LATE_NS, RequestCollector, classify, end_ns
 from asi.regmap import ErrorClass
-
-from .checks import ANSWER_BITS, QUIET_NS, REQUEST_BITS, WIN_LATE_NS, RequestCollector, classify, end_ns
 
 RX_OPEN_NS = 12_000         # P_RX_OPEN
 RX_TIMEOUT_NS = 66_000      # P_RX_TIMEOUT
