@@ -26,6 +26,11 @@ def window(dt_ns):
     return int(n) if n >= 1 and late <= WIN_EARLY_NS + WIN_LATE_NS else None
 
 
+def deviation(pulses):
+    """Largest distance of a pulse from its grid point, ns, with its sign; pulses of a good telegram: see classify()."""
+    return max((dt - HALF_BIT_NS * (window(dt) or 0) for dt, _ in pulses), key=abs)
+
+
 def classify(pulses, bits, quiet_ns=QUIET_NS):
     """[(ns from the first pulse, polarity)] -> (ErrorClass, word or None).
 

@@ -1,27 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Command line: `python -m asi run PLANT` and `python -m asi check PLANT ...`.
+"""Command line: `python -m asi run PLANT`, `python -m asi check PLANT ...` and `python -m asi decode FILE`.
 
-Exit codes: 0 everything as the plant expects, 1 an expectation was not met, 2 bad input (plant, option),
-3 the simulation failed, 130 stopped by Ctrl-C (the report so far is written).
+Exit codes: 0 everything as the plant expects, 1 an expectation was not met (decode: no telegram in the capture),
+2 bad input (plant, capture, option), 3 the simulation failed, 130 stopped by Ctrl-C (the report so far is written).
 """
+import csv
 import fcntl
+import json
 import os
+import sys
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, TextIO
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
+from asi import decode as decoding
 from asi import report
 from asi.bench import BenchError, name_waves, open_bench
+from asi.capture import ARM_V, UNITS, CaptureError, Info, Options
 from asi.plant import SETTLE_NS, Plant, PlantError, load_plant, parse_time
 from asi.run import Runner
+from asi.telegram_log import HEADER, to_line
 
 OK, NOT_MET, BAD_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 EXIT_CODES = {"ok": OK, "expectation not met": NOT_MET, "failed": FAILED, "interrupted": INTERRUPTED}
@@ -191,6 +198,122 @@ def check(
         described = _load(path)
         typer.echo(f"{path}: {described.name}: {len(described.slaves)} slaves, {len(described.host.pcd)} projected, "
                    f"{report.ms(described.duration_ns)}")
+
+
+# ---------------------------------------------------------------- decode
+class Format(str, Enum):
+    table, jsonl, csv, none = "table", "jsonl", "csv", "none"
+
+
+def _writer(form: Format, out: TextIO) -> Callable[[dict[str, Any]], None]:
+    """-> function that writes one telegram record."""
+    if form == Format.table:
+        out.write(HEADER)
+        return lambda record: out.write(to_line(record) + "\n") and None
+    if form == Format.jsonl:
+        return lambda record: out.write(json.dumps(record, separators=(",", ":")) + "\n") and None
+    if form == Format.csv:
+        rows = csv.writer(out, lineterminator="\n")
+        rows.writerow(decoding.FIELDS)
+        return lambda record: rows.writerow([record[name] for name in decoding.FIELDS]) and None
+    return lambda record: None
+
+
+@contextmanager
+def _output(path: Path | None) -> Iterator[TextIO]:
+    if path is None:
+        yield sys.stdout
+        return
+    try:
+        file = open(path, "w", encoding="utf-8")
+    except OSError as error:
+        raise _fail(f"{path}: {error.strerror}", BAD_INPUT) from None
+    with file:
+        yield file
+
+
+def _numbers(text: str) -> frozenset[int]:
+    """'5,7,20-31' -> numbers 1..31."""
+    out: set[int] = set()
+    for part in text.split(","):
+        first, _, last = part.strip().partition("-")
+        if not (first.isdecimal() and (last or first).isdecimal() and 1 <= int(first) <= int(last or first) <= 31):
+            raise typer.BadParameter(f"'{part.strip()}' is no number or range within 1..31")
+        out.update(range(int(first), int(last or first) + 1))
+    return frozenset(out)
+
+
+@app.command()
+def decode(
+    file: Annotated[Path, typer.Argument(help="Capture: VCD, FST, CSV or sigrok session (.sr).", show_default=False)],
+    form: Annotated[Format, typer.Option("--format", "-f", help="What to write per telegram.")] = Format.table,
+    out: Annotated[Path | None, typer.Option("--out", "-o", show_default=False,
+                                             help="Where to; default: the terminal.")] = None,
+    stats: Annotated[Path | None, typer.Option(
+        "--stats", show_default=False, help="Write the statistics as JSON as well.")] = None,
+    p: Annotated[str | None, typer.Option("--p", metavar="SIGNAL", show_default=False,
+                                          help="Positive comparator pulses; with --n.")] = None,
+    n: Annotated[str | None, typer.Option("--n", metavar="SIGNAL", show_default=False,
+                                          help="Negative comparator pulses; with --p.")] = None,
+    man: Annotated[list[str] | None, typer.Option(
+        "--man", metavar="SIGNAL", show_default=False,
+        help="Manchester level, idle high; twice for a pair of which one is idle.")] = None,
+    analog: Annotated[str | None, typer.Option("--analog", metavar="SIGNAL", show_default=False,
+                                               help="Voltage of the line.")] = None,
+    invert: Annotated[bool, typer.Option("--invert", help="Wires swapped; Manchester level idle low.")] = False,
+    columns: Annotated[str | None, typer.Option(
+        metavar="NAME,...", show_default=False, help="Column names of a CSV, instead of its header.")] = None,
+    time_unit: Annotated[str | None, typer.Option(
+        show_default=False, help="Time unit of a CSV: s, ms, us, ns; default: from the header, else s.")] = None,
+    arm: Annotated[float, typer.Option(metavar="VOLT", help="Least amplitude of a first analog pulse.")] = ARM_V,
+    ab: Annotated[frozenset[int] | None, typer.Option(
+        parser=_numbers, metavar="NUMBERS", show_default=False,
+        help="Numbers with A/B addressing, e.g. 5,7,20-31; the others have none. Default: learned.")] = None,
+    plant: Annotated[Path | None, typer.Option(
+        show_default=False, help="Take the numbers with A/B addressing from a plant file.")] = None,
+) -> None:
+    """Decode the telegrams in a capture of the line."""
+    if time_unit is not None and time_unit not in UNITS:
+        raise _fail(f"--time-unit: '{time_unit}' is not one of {', '.join(UNITS)}", BAD_INPUT)
+    if plant is not None and ab is not None:
+        raise _fail("--ab and --plant: one of them", BAD_INPUT)
+    known: Callable[[int], bool | None] = lambda number: None  # noqa: E731
+    if plant is not None:
+        known = _load(plant).extended
+    elif ab is not None:
+        known = ab.__contains__
+    options = Options(p, n, tuple(man or ()), analog, invert, tuple(c.strip() for c in columns.split(",")) if columns
+                      else (), time_unit, arm)
+    info, code = Info(), OK
+    with _output(out) as target:
+        decoder = decoding.Decoder(_writer(form, target), decoding.Extended(known))
+        try:
+            decoding.decode(file, decoder, options, info)
+        except CaptureError as error:
+            target.flush()
+            typer.echo(str(error), err=True)
+            code = BAD_INPUT
+        except KeyboardInterrupt:
+            code = INTERRUPTED
+        target.flush()
+    result = decoder.statistics(file, info)
+    if stats is not None:
+        try:
+            stats.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise _fail(f"{stats}: {error.strerror}", BAD_INPUT) from None
+    if code == BAD_INPUT and not decoder.requests:
+        raise typer.Exit(code)
+    if form in (Format.table, Format.none) or out is not None:
+        console = Console(highlight=False)
+        decoding.show(result, console if console.is_terminal else Console(highlight=False, width=120))
+    else:  # the telegrams have the terminal for themselves
+        for note in result["notes"]:
+            typer.echo(f"note: {note}", err=True)
+    if code == OK and not decoder.requests:
+        code = NOT_MET
+        typer.echo(f"{file}: no telegram", err=True)
+    raise typer.Exit(code)
 
 
 def main() -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Passive monitor: turns the pulses of a line into one record per call, whoever sent them. Times in ns."""
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from asi.checks import ANSWER_BITS, QUIET_NS, REQUEST_BITS, WIN_LATE_NS, RequestCollector, classify, end_ns
+from asi.checks import ANSWER_BITS, QUIET_NS, REQUEST_BITS, WIN_LATE_NS, RequestCollector, classify, deviation, end_ns
 from asi.regmap import ErrorClass
 
 RX_OPEN_NS = 12_000         # P_RX_OPEN
@@ -21,6 +21,8 @@ class Telegram:
 
     error_class judges the answer, or the request itself when request_ok is False (then call is None).
     data: the answer nibble when error_class is OK and there was an answer, else None.
+    request_dev_ns, answer_dev_ns: largest distance of a pulse from the grid in a good request, a good answer.
+    lone_answer: the nibble when what looked like a request was a good answer; its request was not seen.
     """
     t_ns: float
     call: int | None = None
@@ -30,13 +32,20 @@ class Telegram:
     phase: int = 0
     repeated: bool = False
     request_ok: bool = True
+    request_dev_ns: float | None = field(default=None, compare=False)
+    answer_dev_ns: float | None = field(default=None, compare=False)
+    lone_answer: int | None = field(default=None, compare=False)
 
 
 class Monitor:
-    """Listens on a line; finished records are in telegrams. phase: function giving phase_e, called per request."""
+    """Listens on a line; finished records are in telegrams. phase: function giving phase_e, called per request.
 
-    def __init__(self, line=None, phase=lambda: 0):
+    sink: gets the finished records instead of telegrams, so that nothing grows.
+    """
+
+    def __init__(self, line=None, phase=lambda: 0, sink=None):
         self.telegrams = []
+        self._sink = sink or self.telegrams.append
         self._phase = phase
         self._record = self._previous = None
         self._step = self._idle
@@ -62,6 +71,7 @@ class Monitor:
             error, word = classify(self._pulses, ANSWER_BITS)
             if error is ErrorClass.OK:
                 self._record.data = word >> 2 & 15
+                self._record.answer_dev_ns = deviation(self._pulses)
             self._close(error, self._idle if error is ErrorClass.OK else self._noise)
         elif self._step == self._bad_request and t_ns - self._last_ns >= PAUSE_NS:
             self._finish_bad_request()
@@ -71,6 +81,13 @@ class Monitor:
                 self._finish_bad_request()
         if self._step == self._noise and t_ns - self._last_ns >= PAUSE_NS:
             self._step = self._idle
+
+    @property
+    def open(self):
+        """The record that is not finished and what it lacks, None between two telegrams."""
+        lack = {self._receiving: "the request is cut off", self._bad_request: "the request is bad or cut off",
+                self._waiting: "no answer yet", self._answer: "the answer is cut off"}.get(self._step)
+        return (self._record, lack) if lack else None
 
     # ------------------------------------------------------------------ one method per state
     def _idle(self, t_ns, polarity):
@@ -86,6 +103,7 @@ class Monitor:
         elif self._request.call is not None:
             self._end_ns = t_ns
             self._record.call = self._request.call
+            self._record.request_dev_ns = deviation(self._pulses)
             self._step = self._waiting
 
     def _bad_request(self, t_ns, polarity):
@@ -109,6 +127,9 @@ class Monitor:
     # ------------------------------------------------------------------ closing a record
     def _finish_bad_request(self):
         self._record.request_ok = False
+        error, word = classify(self._pulses, ANSWER_BITS)
+        if error is ErrorClass.OK:
+            self._record.lone_answer = word >> 2 & 15
         self._close(classify(self._pulses, REQUEST_BITS)[0], self._idle)
 
     def _close(self, error, step):
@@ -117,5 +138,5 @@ class Monitor:
         record.repeated = bool(previous and previous.error_class != ErrorClass.OK and previous.call == record.call
                                and record.call is not None and record.t_ns - previous.t_ns <= REPEAT_NS)
         self._previous = record
-        self.telegrams.append(record)
         self._step = step
+        self._sink(record)

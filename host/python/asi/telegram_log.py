@@ -57,7 +57,7 @@ def to_record(telegram: Any, extended: Callable[[int], bool] = lambda number: Fa
         "answer": f"{telegram.data:04b}" if answered else None,
         "delay_ns": telegram.delay_ns if telegram.delay_ns >= 0 else None,
         "class": _name(ErrorClass, telegram.error_class),
-        "phase": _name(Phase, telegram.phase),
+        "phase": None if telegram.phase is None else _name(Phase, telegram.phase),
         "repeated": bool(telegram.repeated),
         "request_ok": bool(telegram.request_ok),
         "word": telegram.call,
@@ -70,7 +70,7 @@ def to_line(record: dict[str, Any]) -> str:
     remark = " ".join(["repeated"] * record["repeated"] + ["bad request"] * (not record["request_ok"]))
     return (f"{record['t_ns'] / 1000:15.3f}  {record['call']:<4} {record['address'] or 'all':<4} "
             f"{record['data'] or '':<5} -> {record['answer'] or '-':<6}  {delay:>8}  {record['class']:<14} "
-            f"{record['phase']:<13} {remark}").rstrip()
+            f"{record['phase'] or '-':<13} {remark}").rstrip()
 
 
 def _name(enum: type, value: int) -> str:
