@@ -56,12 +56,13 @@ class Sink:
 
 @dataclass
 class Info:
-    """What was read: format, signals as they were chosen, last time."""
+    """What was read so far: format, signals as they were chosen, last time."""
     format: str = ""
     kind: str = ""                      # pulses, man, analog
     signals: list[str] = field(default_factory=list)
     end_ns: float = 0
     notes: list[str] = field(default_factory=list)
+    front: Any = None
 
 
 # ---------------------------------------------------------------- front ends
@@ -372,7 +373,7 @@ def _read_vcd(path: Path, options: Options, sink: Sink, info: Info) -> None:
         names = [name for name, _, _ in signals]
         info.kind, chosen = choose(names, options, where, lambda k: signals[k][2] in ("real", "realtime"))
         _described(info, names, chosen)
-        front = _Front(info.kind, options, sink)
+        front = info.front = _Front(info.kind, options, sink)
         values = front.idle()[:len(chosen)]
         slots: dict[bytes, list[int]] = {}
         for slot, k in enumerate(chosen):
@@ -397,7 +398,7 @@ def _read_vcd(path: Path, options: Options, sink: Sink, info: Info) -> None:
                     if changed:
                         front.values(now, values)
                         changed = False
-                    now = time
+                    now = info.end_ns = time
                     if not begun:
                         begun = True
                         sink.begin(now)
@@ -429,8 +430,6 @@ def _read_vcd(path: Path, options: Options, sink: Sink, info: Info) -> None:
                     sink.phase(now, int(text, 2) if set(text) <= set(b"01") else 0)
         if changed:
             front.values(now, values)
-        info.end_ns = now
-        front.settle(now)
 
 
 def _vcd_value(text: bytes, kind: bytes, want: str) -> float | int | None:
@@ -451,7 +450,7 @@ def _shown(word: bytes) -> str:
 def _read_fst(path: Path, options: Options, sink: Sink, info: Info) -> None:
     import pywellen  # only here: other formats need nothing beyond the standard library
     where = str(path)
-    state: dict[str, Any] = {"now": 0.0, "begun": False}
+    begun, last_phase = False, None
     try:
         wave = pywellen.Waveform(where, stream_only=True)
         signals = list(wave.all_vars())
@@ -466,24 +465,21 @@ def _read_fst(path: Path, options: Options, sink: Sink, info: Info) -> None:
     names = [var.full_name for var in signals]
     info.kind, chosen = choose(names, options, where, lambda k: bool(signals[k].is_real))
     _described(info, names, chosen)
-    front = _Front(info.kind, options, sink)
+    front = info.front = _Front(info.kind, options, sink)
     values = front.idle()[:len(chosen)]
     ids = [signals[k].signal_id for k in chosen]
     phase = _phase_signal(names, chosen)
     phase_id = None if phase is None else signals[phase].signal_id
-    sent: dict[str, Any] = {"phase": None}
 
     def step(time: int, present: Any, _changed: Any) -> None:
-        now = time * step_ns
-        if not state["begun"]:
-            state["begun"] = True
+        nonlocal begun, last_phase
+        now = info.end_ns = time * step_ns
+        if not begun:
+            begun = True
             sink.begin(now)
-        state["now"] = now
-        if phase_id is not None:
-            number = present[phase_id]
-            if number != sent["phase"]:
-                sent["phase"] = number
-                sink.phase(now, number if isinstance(number, int) else 0)
+        if phase_id is not None and (number := present[phase_id]) != last_phase:
+            last_phase = number
+            sink.phase(now, number if isinstance(number, int) else 0)
         for slot, signal in enumerate(ids):
             value = present[signal]
             if isinstance(value, (int, float)):  # else x or z: as it was
@@ -496,9 +492,7 @@ def _read_fst(path: Path, options: Options, sink: Sink, info: Info) -> None:
     except (KeyboardInterrupt, SystemExit, BrokenPipeError):
         raise
     except BaseException as error:
-        raise CaptureError(f"{where}: at {state['now']:.0f} ns: {_one_line(error)}") from None
-    info.end_ns = state["now"]
-    front.settle(info.end_ns)
+        raise CaptureError(f"{where}: at {info.end_ns:.0f} ns: {_one_line(error)}") from None
 
 
 def _one_line(error: BaseException) -> str:
@@ -593,7 +587,7 @@ def _read_csv(path: Path, options: Options, sink: Sink, info: Info) -> None:
         if sample_ns > slowest * 1.01 or (info.kind == "analog" and steps and min(steps) > slowest * 1.01):
             raise CaptureError(f"{where}: a sample every {sample_ns or min(steps):.0f} ns is too slow; "
                                f"at least {LOWEST_RATE_HZ / 1e6:g} MHz ({slowest:.0f} ns)")
-        front = _Front(info.kind, options, sink, sample_ns)
+        front = info.front = _Front(info.kind, options, sink, sample_ns)
         sink.begin(early[0][1][column] * scale)
         now = early[0][1][column] * scale
 
@@ -604,7 +598,7 @@ def _read_csv(path: Path, options: Options, sink: Sink, info: Info) -> None:
                 time = values[column] * scale
                 if time < now:
                     raise CaptureError(f"{where}: line {at}: time goes back from {now:.0f} to {time:.0f} ns")
-                now = time
+                now = info.end_ns = time
                 if info.kind == "analog":
                     front.values(now, [values[picked[0]]])
                     continue
@@ -617,8 +611,6 @@ def _read_csv(path: Path, options: Options, sink: Sink, info: Info) -> None:
         if fault:
             raise fault
         feed(stream)
-        info.end_ns = now
-        front.settle(now)
 
 
 # ---------------------------------------------------------------- sigrok session
@@ -681,7 +673,7 @@ def _read_session(session: zipfile.ZipFile, where: str, options: Options, sink: 
     if any(channels[k][2] != (info.kind == "analog") for k in chosen):
         raise CaptureError(f"{where}: {', '.join(info.signals)}: {'levels' if info.kind == 'analog' else 'volts'}"
                            f" where {'volts' if info.kind == 'analog' else 'levels'} are needed")
-    front = _Front(info.kind, options, sink, 1e9 / rate)
+    front = info.front = _Front(info.kind, options, sink, 1e9 / rate)
     sink.begin(0.0)
     done = 0
     if info.kind == "analog":
@@ -690,7 +682,8 @@ def _read_session(session: zipfile.ZipFile, where: str, options: Options, sink: 
             for volts in array("f", piece):
                 if not math.isfinite(volts):
                     raise CaptureError(f"{where}: sample {done} is no voltage")
-                front.values(done * 1e9 / rate, [volts])
+                info.end_ns = done * 1e9 / rate
+                front.values(info.end_ns, [volts])
                 done += 1
     else:
         size = int(device.get("unitsize", "1"))
@@ -710,10 +703,9 @@ def _read_session(session: zipfile.ZipFile, where: str, options: Options, sink: 
                     last = value
                     front.values((done + run.start()) * 1e9 / rate, [value >> slot & 1 for slot in range(len(bits))])
             done += length
+            info.end_ns = done * 1e9 / rate
     if not done:
         raise CaptureError(f"{where}: no samples")
-    info.end_ns = done * 1e9 / rate
-    front.settle(info.end_ns)
 
 
 # ---------------------------------------------------------------- entry
@@ -744,3 +736,6 @@ def read(path: Path, options: Options, sink: Sink, info: Info) -> None:
         raise
     except OSError as error:
         raise CaptureError(f"{path}: {error.strerror or error}") from None
+    finally:
+        if info.front:
+            info.front.settle(info.end_ns)

@@ -129,7 +129,8 @@ class Decoder:
         self.classes: Counter = Counter()
         self.requests = self.repeated = self.failed = self.bad_requests = self.positive_starts = 0
         self.request_deviation_ns: float | None = None
-        self.first_ns = self.last_ns = self.begin_ns = self._pulse_ns = None
+        self.first_ns: float | None = None
+        self.last_ns = self.begin_ns = self._pulse_ns = 0.0
         self.notes: list[str] = []
         self._emit = emit
         self._sync_ns = float("inf")    # from here on a telegram that begins is a request
@@ -271,9 +272,10 @@ def _whole(value: float | None) -> int | None:
 def decode(path: Path, decoder: Decoder, options: Options = Options(), info: Info | None = None) -> Info:
     """Decode a whole capture; CaptureError (asi.capture) where it cannot be read further, with all before it done."""
     info = info or Info()
-    decoder.begin_ns = decoder._pulse_ns = 0.0
-    read(path, options, decoder.sink(), info)
-    decoder.end(info.end_ns)
+    try:
+        read(path, options, decoder.sink(), info)
+    finally:
+        decoder.end(info.end_ns)
     return info
 
 
@@ -288,11 +290,18 @@ def render(statistics: dict[str, Any]) -> Group:
     for name in ("addr", "requests", "answers", "repeated", "delay us min", "mean", "max", "deviation us"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("errors")
+    silent = [row for row in statistics["slaves"] if set(row["by_class"]) == {"NO_RESPONSE"}]
     for row in statistics["slaves"]:
+        if row in silent:
+            continue
         errors = ", ".join(f"{name} {count}" for name, count in row["by_class"].items() if name != "OK")
         table.add_row(row["address"], str(row["requests"]), str(row["answers"]), str(row["repeated"]),
                       _us(row["delay_min_ns"]), _us(row["delay_mean_ns"]), _us(row["delay_max_ns"]),
                       _us(row["deviation_ns"]), Text(errors, style="red"))
+    if silent:
+        table.add_row("other", str(sum(row["requests"] for row in silent)), "0",
+                      str(sum(row["repeated"] for row in silent)), "-", "-", "-", "-",
+                      f"{len(silent)} address{'es' * (len(silent) > 1)} without any answer")
     telegrams, cycles = statistics["telegrams"], statistics["cycles"]
     foot = Table.grid(padding=(0, 2))
     foot.add_column(style="dim")
