@@ -23,7 +23,7 @@ from asi import decode as decoding
 from asi.bench import name_waves, open_bench
 from asi.capture import Analog, CaptureError, Comparators, Info, Manchester, Options
 from asi.cli import QUICK_SETTLE_NS, app
-from asi.plant import load_plant
+from asi.plant import Faults, load_plant
 from asi.run import Runner
 from asi.telegram import encode_call, pulses, request_pulses, response_pulses, response_word
 
@@ -248,7 +248,8 @@ def test_signal_names(tmp_path):
     assert short(run_decoder(tmp_path, rows, p="2", n="3", time_unit="ns")[0]) == EXPECTED
     bare = rows.split("\n", 1)[1]
     assert short(run_decoder(tmp_path, bare, columns=("time_ns", "p", "n"))[0]) == EXPECTED
-    inner = vcd(levels(TRAIN)).replace("$upscope", "$scope module x $end $var wire 1 @ rx_p_i $end $upscope $end $upscope")
+    inner = vcd(levels(TRAIN)).replace(
+        "$upscope", "$scope module x $end $var wire 1 @ rx_p_i $end $upscope $end $upscope")
     assert run_decoder(tmp_path, inner)[1]["signals"] == ["top.rx_p_i", "top.rx_n_i"]
 
 
@@ -461,14 +462,29 @@ def test_cycles_survive_changes():
 
 
 # ---------------------------------------------------------------- the chip
-@pytest.mark.parametrize("name", ["packaging", "faults", "extended62"])
-def test_run_and_capture_agree(tmp_path, name):
-    """DE-002, DE-007: the waves of a run decode to its telegram log, telegram for telegram, phase included."""
+NOISE = Faults(no_answer=2_000, parity=4_000, missing_pulse=6_000, shifted_pulse=6_000, extra_pulse=4_000,
+               shift_ns=1_800)
+
+
+@pytest.mark.parametrize("name, noise", [("packaging", None), ("extended62", None), ("standard31", NOISE)])
+def test_run_and_capture_agree(tmp_path, name, noise):
+    """DE-002, DE-004, DE-007: the waves of a run decode to its telegram log, telegram for telegram, phase included.
+
+    With noise on all slaves too: every error class that faults of an answer can cause is there.
+    """
     plant = load_plant(ROOT / f"sim/plants/{name}.toml").with_settle(QUICK_SETTLE_NS)
     waves = tmp_path / "waves.part"
     bench = open_bench(ROOT / "build/firmware/asi_test.hex", waves, plant.seed)
+    if noise:
+        add = bench.add
+
+        def add_noisy(slave):
+            handle = add(slave)
+            bench.set_faults(handle, noise)
+            return handle
+        bench.add = add_noisy
     try:
-        Runner(plant, bench, tmp_path, 90_000_000).run()
+        Runner(plant, bench, tmp_path, 180_000_000 if name == "extended62" else 110_000_000).run()
         cycles = bench.stats()
     finally:
         bench.close()
@@ -478,19 +494,46 @@ def test_run_and_capture_agree(tmp_path, name):
     path = name_waves(waves)
     info = decoding.decode(path, decoder)
     statistics = decoder.statistics(path, info)
-    assert len(wanted) > 300 and len(records) == len(wanted)
+    assert len(wanted) > 300 and len(records) in (len(wanted), len(wanted) - 1)  # the last one may be cut off
+    assert not noise or {r["class"] for r in records} >= {"OK", "NO_RESPONSE", "ALTERNATION", "TIMING",
+                                                          "NO_INFORMATION", "PARITY", "LENGTH"}
     clock = 1e9 / bench.clk_hz
     for record, other in zip(records, wanted):
         assert abs(record.pop("t_ns") - other.pop("t_ns")) <= clock
         if record["delay_ns"] is not None and other["delay_ns"] is not None:
             assert abs(record.pop("delay_ns") - other.pop("delay_ns")) <= clock
         assert record == other
-    if statistics["cycles"]["count"] > 5:
+    if not noise:
+        assert statistics["cycles"]["count"] > 5
         assert abs(statistics["cycles"]["min_ns"] - cycles.cycle_min_ns) <= clock
     learned = []
     decoding.decode(path, decoding.Decoder(learned.append))
     last = {r["index"]: r["address"] for r in records if r["answer"] and r["call"] == "DEXG"}
-    assert last == {r["index"]: r["address"] for r in learned if r["answer"] and r["call"] == "DEXG"}
+    assert last and last == {r["index"]: r["address"] for r in learned if r["answer"] and r["call"] == "DEXG"}
+
+
+def test_damaged_waves(tmp_path, capfd):
+    """DE-009: damaged binary waves give telegrams or one line; the reader's own panics do not reach the terminal."""
+    waves = tmp_path / "waves.part"
+    bench = open_bench(ROOT / "build/firmware/asi_test.hex", waves, 1)
+    bench.run(21_500_000)
+    bench.close()
+    path = name_waves(waves)
+    content = path.read_bytes()
+    rng = random.Random(7)
+    refused = 0
+    for number in range(30):
+        data = bytearray(content)
+        for _ in range(rng.randint(1, 4)):
+            data[rng.choice((rng.randrange(400), len(data) - 1 - rng.randrange(9_000), rng.randrange(len(data))))] ^= \
+                1 << rng.randrange(8)
+        path.write_bytes(data if number % 3 else data[:rng.randrange(len(data))])
+        result = command(path, "-f", "none")
+        assert result.exit_code in (0, 1, 2) and (result.exception is None or isinstance(result.exception, SystemExit))
+        assert result.exit_code == 0 or len(result.stderr.splitlines()) == 1
+        refused += result.exit_code == 2
+    assert refused > 5
+    assert capfd.readouterr().err == ""
 
 
 # ---------------------------------------------------------------- command
@@ -627,7 +670,7 @@ def damage(content, patches, length):
 
 # ---------------------------------------------------------------- size
 def test_memory_does_not_grow(tmp_path):
-    """DE-010: ten times the capture, the same memory: VCD, CSV and sigrok."""
+    """DE-010: five times the capture, the same memory: VCD, CSV and sigrok."""
     talk = [(encode_call("DEXG", 1 + k % 5, k & 15), k & 15) for k in range(60)]
 
     def peak(content):
@@ -646,8 +689,8 @@ def test_memory_does_not_grow(tmp_path):
             tracemalloc.stop()
 
     for make in (lambda rows: vcd(rows), lambda rows: csv_text(rows), lambda rows: session(sampled(rows, 4e6), 4e6)):
-        (small, few), (large, many) = (peak(make(levels(conversation(*talk * times)))) for times in (2, 20))
-        assert many == 10 * few == 1200
+        (small, few), (large, many) = (peak(make(levels(conversation(*talk * times)))) for times in (2, 10))
+        assert many == 5 * few == 600
         assert large < small * 1.25 + 20_000
 
 

@@ -7,11 +7,13 @@ Every fault of a file is a CaptureError: one line that names file, place and rea
 """
 import configparser
 import math
+import os
 import re
 import zipfile
 import zlib
 from array import array
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import count, islice, takewhile
 from pathlib import Path
@@ -447,14 +449,28 @@ def _shown(word: bytes) -> str:
 
 
 # ---------------------------------------------------------------- FST
+@contextmanager
+def _silent() -> Iterator[None]:
+    """The FST reader prints its panics to standard error by itself; here each becomes a CaptureError instead."""
+    saved = os.dup(2)
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+
+
 def _read_fst(path: Path, options: Options, sink: Sink, info: Info) -> None:
     import pywellen  # only here: other formats need nothing beyond the standard library
     where = str(path)
     begun, last_phase = False, None
     try:
-        wave = pywellen.Waveform(where, stream_only=True)
-        signals = list(wave.all_vars())
-        scale = wave.timescale
+        with _silent():
+            wave = pywellen.Waveform(where, stream_only=True)
+            signals = list(wave.all_vars())
+            scale = wave.timescale
     except (KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:  # a panic of the reader is no Exception
@@ -488,7 +504,8 @@ def _read_fst(path: Path, options: Options, sink: Sink, info: Info) -> None:
 
     wanted = [signals[k] for k in ([*chosen] if phase is None else [*chosen, phase])]
     try:
-        wave.stream_time_steps(step, wanted)
+        with _silent():
+            wave.stream_time_steps(step, wanted)
     except (KeyboardInterrupt, SystemExit, BrokenPipeError):
         raise
     except BaseException as error:
