@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 OUT = Path("build/formal")
+TIMEOUT = 600  # seconds per task
 MAP, TIMES, SYNC, FILTER = ("rtl/generated/asi_map_pkg.sv", "rtl/phy/asi_timing_pkg.sv", "rtl/phy/asi_sync.sv",
                             "rtl/phy/asi_pulse_filter.sv")
 MODES = {"prove": "k-induction", "bmc": "bounded", "cover": "reachable"}
@@ -38,7 +39,7 @@ TARGETS = (
     Target("asi_pulse_filter", (TIMES, FILTER), (("prove", 10), ("cover", 30)), "full, 8 MHz", "RX-009"),
     Target("asi_line_guard", (TIMES, SYNC, "rtl/phy/asi_line_guard.sv"), (("prove", 4), ("cover", 50)),
            "full; covers: short times", "LT-010"),
-    Target("asi_tx", (TIMES, "rtl/phy/asi_tx.sv"), (("prove", 3), ("cover", 120)), "full, 8 MHz; covers: 0.5 us grid",
+    Target("asi_tx", (TIMES, "rtl/phy/asi_tx.sv"), (("prove", 3), ("cover", 62)), "full, 8 MHz; covers: 0.25 us grid",
            "TL-001, TL-003..TL-005, LT-001, LT-009"),
 )
 
@@ -49,7 +50,7 @@ def write_sby(target: Target, mode: str, depth: int) -> Path:
     define = " -D FV_COVER" if mode == "cover" else ""
     path = OUT / f"{target.name}-{mode}.sby"
     path.write_text(
-        f"[options]\nmode {mode}\ndepth {depth}\n\n[engines]\nsmtbmc --stbv z3\n\n[script]\n"
+        f"[options]\nmode {mode}\ndepth {depth}\ntimeout {TIMEOUT}\n\n[engines]\nsmtbmc --stbv z3\n\n[script]\n"
         f"read_slang -j 1 --no-synthesis-define -D FORMAL{define} --top {target.name}_fv "
         f"{' '.join(Path(f).name for f in files)}\n"
         f"prep -top {target.name}_fv\n\n[files]\n" + "\n".join(files) + "\n")
