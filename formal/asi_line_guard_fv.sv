@@ -47,13 +47,17 @@ module asi_line_guard_fv (input logic clk_i, rst_i, tick_i, apf_ni, efault_i);
       Stuck_A: assert (!apf || high_q <= 15'(OkUs + 1));
       // for the induction: the counters of the block against those of the rule
       Pin_A:   assert (dut.good == good_q);
-      Runs_A:  assert ((low_q == '0 || high_q == '0) && (good_q || high_q == '0 || 1'b1));
+      Runs_A:  assert ((good_q || fail_q >= low_q) && (!good_q || clear_q >= high_q));
+      Zero_A:  assert (low_q == '0 || high_q == '0);
       Dip_A:   assert (dut.good_q == good_q || dut.dip_q == 3'(run));
+      Limit_A: assert (15'(dut.cnt_q) < 15'((apf ? OkUs : OnUs) - DipUs));
       Dips_A:  assert (dut.dip_q <= 3'(DipUs));
       Low_A:   assert (good_q || !dut.good_q || low_q <= 15'(DipUs));
       High_A:  assert (!good_q || dut.good_q || high_q <= 15'(DipUs));
       Fail_A:  assert (apf || dut.good_q || fail_q >= 15'(dut.cnt_q) + 15'(DipUs + 1) || fail_q == '1);
       Ok_A:    assert (!apf || !dut.good_q || clear_q >= 15'(dut.cnt_q) + 15'(DipUs + 1) || clear_q == '1);
+      Lag_A:   assert (good_q || dut.good_q || apf || 15'(dut.cnt_q) + 15'(DipUs + 1) >= low_q);
+      Lags_A:  assert (!good_q || !dut.good_q || !apf || 15'(dut.cnt_q) + 15'(DipUs + 1) >= high_q);
     end
     Dip_C:   cover (!rst_i && !apf && low_q == 15'(DipUs) && good1_q);
     Again_C: cover (!rst_i && apf && !apf_q);
