@@ -62,6 +62,11 @@ lint: $(VENV)/.ready  ## Verilator -Wall over the whole chip, three parameter se
 synth: $(VENV)/.synth $(BUILD)/firmware/boot.hex  ## cells and MHz on UP5K and ECP5 (minutes); build/synth/numbers.json
 	@$(VPY) syn/synth.py --vexriscv $(VEXRISCV) --out $(BUILD)/synth $(ARGS)
 
+# ---------------------------------------------------------------- proofs
+.PHONY: formal
+formal: $(VENV)/.synth  ## prove the small blocks with SymbiYosys and z3 (docs/formal.md); ARGS='asi_rx' for one
+	@$(VPY) formal/run.py $(ARGS)
+
 # ---------------------------------------------------------------- firmware
 include firmware/firmware.mk
 

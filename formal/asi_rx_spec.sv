@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // asi_rx_spec: the receiver rules RX-001 .. RX-008, RX-010, written from the text and without regard to size: a table of
-// what came in each window, one clock count from the first pulse, all verdicts at the decision. 8 MHz, answers only.
+// what came in each window, one clock count from the first pulse, all verdicts at the decision. Answers only.
 // Read into the rules: a negative and a positive strobe in one clock are two pulses in one place, the positive one last;
 // the end pulse is the first pulse of window 12, and only what follows it is a matter of length.
-module asi_rx_spec import asi_map_pkg::*; (
+module asi_rx_spec import asi_map_pkg::*; #(
+  parameter int Half = 24, Early = 7, Late = 12             // 3 us, 0.875 us, 1.5 us at 8 MHz, counted by hand
+) (
   input  logic         clk_i, rst_i, n_i, p_i, en_i,
   output logic         first_o, done_o, busy_o,
   output error_class_e class_o,
@@ -12,7 +14,6 @@ module asi_rx_spec import asi_map_pkg::*; (
   output logic [12:0]  got_o, pol_o,                        // per window: a pulse came; it was positive
   output logic         start_o, alt_o, timing_o, len_o, ended_o, last_o  // rules broken so far; polarity of the last pulse
 );
-  localparam int Half = 24, Early = 7, Late = 12;           // 3 us, 0.875 us, 1.5 us
   localparam int Decision = 14 * Half + Late;               // 43.5 us
 
   logic        pulse, placed, again, alt, timing, len, no_info;

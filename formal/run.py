@@ -41,8 +41,10 @@ TARGETS = (
            "full; covers: short times", "LT-010"),
     Target("asi_tx", (TIMES, "rtl/phy/asi_tx.sv"), (("prove", 3), ("cover", 62)), "full, 8 MHz; covers: 0.25 us grid",
            "TL-001, TL-003..TL-005, LT-001, LT-009"),
-    Target("asi_rx", (MAP, TIMES, "rtl/phy/asi_rx.sv", "formal/asi_rx_spec.sv"), (("prove", 3),), "full, 8 MHz",
+    Target("asi_rx", (MAP, TIMES, "rtl/phy/asi_rx.sv", "formal/asi_rx_spec.sv"), (("prove", 3), ("cover", 62)), "full, 8 MHz; covers: 0.5 us grid",
            "RX-001..RX-008, RX-010"),
+    Target("asi_dpm", (MAP, "rtl/dpm/asi_dpm.sv", "formal/asi_ram_fv.sv"), (("prove", 5), ("cover", 12)),
+           "any one word of 4096", "HW-001, HW-005, HW-006"),
 )
 
 
