@@ -45,6 +45,8 @@ TARGETS = (
            "RX-001..RX-008, RX-010"),
     Target("asi_dpm", (MAP, "rtl/dpm/asi_dpm.sv", "formal/asi_ram_fv.sv"), (("prove", 5), ("cover", 12)),
            "any one word of 4096", "HW-001, HW-005, HW-006"),
+    Target("asi_xact", (MAP, TIMES, SYNC, FILTER, "rtl/phy/asi_tx.sv", "rtl/phy/asi_rx.sv", "rtl/phy/asi_xact.sv"),
+           (("prove", 3),), "full, 8 MHz", "LT-002..LT-008, LT-011"),
 )
 
 

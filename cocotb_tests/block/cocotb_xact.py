@@ -538,3 +538,31 @@ async def babble(dut):
     offered = now()
     assert await tb.request() - offered <= tb.us(1000)
     noise_task.cancel()
+
+
+@cocotb.test(timeout_time=40, timeout_unit="ms")
+async def babble_interrupted(dut):
+    """LT-007, LT-008: enable off for one clock ends the wait of a babbling line, whenever it comes: the next request has
+    its 1 ms again. One clock near the end of the wait was once enough to start it at once."""
+    tb = TB(dut)
+    await tb.start(enable=0)
+
+    async def noise():
+        while True:
+            await tb.pulse(now() + tb.us(5), 1)
+    noise_task = cocotb.start_soon(noise())
+    for early in range(6):
+        dut.enable_i.value = 1
+        await wait(tb.us(1000) - early)
+        dut.enable_i.value = 0
+        await wait(1)
+        tb.sent.clear()
+        dut.enable_i.value = 1
+        dut.req_valid_i.value = 1
+        enabled = now()
+        await wait(tb.us(900))
+        assert tb.sent == [], (early, tb.sent[0][0] - enabled)
+        dut.req_valid_i.value = 0
+        dut.enable_i.value = 0
+        await wait(4)
+    noise_task.cancel()

@@ -169,7 +169,7 @@ module asi_xact
       state_d = start ? StTx : StReady;  time_d = '0;  armed_d = 1'b0;
     end
     if (!enable_i) state_d = StOff;
-    babble_d = (quiet_wait && !can_start) ? babble_q + 1'b1 : '0;
+    babble_d = (quiet_wait && !can_start && enable_i) ? babble_q + 1'b1 : '0;  // 0 in StOff: it ends no wait there
   end
 
   always_comb begin
