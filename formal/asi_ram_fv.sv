@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// asi_ram for proofs: only the watched word is kept, a read of any other gives a wrong value. The watched address is any
-// constant, so what is proved of this word is proved of all.
+// asi_ram for proofs: only the watched word is kept, a read of any other gives a wrong value. The watched address is
+// any constant, so what is proved of this word is proved of all.
 module asi_ram #(
   parameter int unsigned Words = 1024
 ) (

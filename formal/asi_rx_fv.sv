@@ -16,7 +16,8 @@ module asi_rx_fv import asi_map_pkg::*; (input logic clk_i, rst_i, n_i, p_i, en_
   asi_rx #(
     .ClkHz(8_000_000), .HalfBitNs(Half * 125), .WinEarlyNs(Early * 125), .WinLateNs(Late * 125), .RxQuietNs(Half * 250)
   ) dut (
-    .clk_i, .rst_i, .n_start_i(n_i), .p_start_i(p_i), .en_i, .first_o(first), .done_o(done), .class_o(cls), .data_o(data)
+    .clk_i, .rst_i, .n_start_i(n_i), .p_start_i(p_i), .en_i, .first_o(first), .done_o(done), .class_o(cls),
+    .data_o(data)
   );
   asi_rx_spec #(.Half(Half), .Early(Early), .Late(Late)) spec (
     .clk_i, .rst_i, .n_i, .p_i, .en_i, .first_o(s_first), .done_o(s_done), .busy_o(busy), .class_o(s_cls),
@@ -57,7 +58,8 @@ module asi_rx_fv import asi_map_pkg::*; (input logic clk_i, rst_i, n_i, p_i, en_
         Future_A: assert ((got >> (dut.win_q + 4'd1)) == '0);
         End_A:    assert (!ended || dut.win_q != 4'd12 || int'(dut.ph_q) > Early + Late || dut.seen_q);
         Over_A:   assert (!ended || dut.win_q >= 4'd12);
-        Seen_A:   assert (timing || ended || dut.win_q > 4'd12 || dut.seen_q == (int'(dut.ph_q) <= Early + Late && got[dut.win_q]));
+        Seen_A:   assert (timing || ended || dut.win_q > 4'd12 ||
+                         dut.seen_q == (int'(dut.ph_q) <= Early + Late && got[dut.win_q]));
         Info_A:   assert (timing || dut.info_q == missed);
         Bits_A:   assert (timing || ((dut.bits_q ^ bits) & mask) == '0);
       end

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// asi_rx_spec: the receiver rules RX-001 .. RX-008, RX-010, written from the text and without regard to size: a table of
-// what came in each window, one clock count from the first pulse, all verdicts at the decision. Answers only.
-// Read into the rules: a negative and a positive strobe in one clock are two pulses in one place, the positive one last;
-// the end pulse is the first pulse of window 12, and only what follows it is a matter of length.
+// asi_rx_spec: the receiver rules RX-001 .. RX-008, RX-010, written from the text and without regard to size: a table
+// of what came in each window, one clock count from the first pulse, all verdicts at the decision. Answers only.
+// Read into the rules: a negative and a positive strobe in one clock are two pulses in one place, the positive one
+// last; the end pulse is the first pulse of window 12, and only what follows it is a matter of length.
 module asi_rx_spec import asi_map_pkg::*; #(
   parameter int Half = 24, Early = 7, Late = 12             // 3 us, 0.875 us, 1.5 us at 8 MHz, counted by hand
 ) (
@@ -12,7 +12,7 @@ module asi_rx_spec import asi_map_pkg::*; #(
   output logic [3:0]   data_o,
   output logic [8:0]   t_o,                                 // clocks since the first pulse
   output logic [12:0]  got_o, pol_o,                        // per window: a pulse came; it was positive
-  output logic         start_o, alt_o, timing_o, len_o, ended_o, last_o  // rules broken so far; polarity of the last pulse
+  output logic         start_o, alt_o, timing_o, len_o, ended_o, last_o  // rules broken; last pulse's polarity
 );
   localparam int Decision = 14 * Half + Late;               // 43.5 us
 

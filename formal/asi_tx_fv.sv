@@ -14,7 +14,7 @@ module asi_tx_fv (input logic clk_i, rst_i, start_i, arm_i, input logic [10:0] c
   );
 
   // The rule: half bit 0 begins with the falling edge in the middle of the start bit; half bit 2k is the second half of
-  // bit k and shows it, half bit 2k - 1 is its first half and shows the complement; 27 half bits end the end bit's cell.
+  // bit k and shows it, half bit 2k - 1 is its first half and shows the complement; 27 half bits in all.
   logic        init_q = 1'b1, live_q = 1'b0;
   logic        on_q;       // a request is on the line
   logic [4:0]  half_q;     // half bit 0..26

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proof of asi_xact with its real filters, asi_tx and asi_rx, unbounded, at the real times (8 MHz):
 // LT-003..LT-008: no request starts before its gap, and it starts exactly then when it was offered in time;
-// LT-007: a babbling line delays it at most P_BABBLE_MAX; LT-011: nothing starts while disabled, an open call ends at once;
+// LT-007: a babbling line delays it at most P_BABBLE_MAX; LT-011: nothing starts while disabled,
+// an open call ends at once;
 // one result per request taken. That asi_tx ends 78 us after its start is proved in asi_tx_fv.
 module asi_xact_fv import asi_map_pkg::*; (
   input logic clk_i, rst_i, enable_i, req_valid_i, req_no_reply_i, rx_p_i, rx_n_i,
@@ -103,7 +104,8 @@ module asi_xact_fv import asi_map_pkg::*; (
       RxTime_A:  assert (state != StReceive || (rx_t >= 1 && rx_t <= Answer && dut.i_rx.ph_q < 5'd24 &&
                          int'(own_q) <= Timeout + Delay + rx_t));
       RxQuiet_A: assert (state != StReceive || (dut.time_q == 10'(quiet_q) && int'(quiet_q) <= Delay + rx_t));
-      RxEnd_A:   assert (state != StReceive || !dut.i_rx.ended_q || (rx_t >= 282 && int'(quiet_q) <= rx_t - 281 + Delay));
+      RxEnd_A:   assert (state != StReceive || !dut.i_rx.ended_q ||
+                         (rx_t >= 282 && int'(quiet_q) <= rx_t - 281 + Delay));
       RxPast_A:  assert (state != StReceive || !(dut.i_rx.win_q > 4'd12 || (dut.i_rx.win_q == 4'd12 &&
                          (dut.i_rx.ph_q > 5'd19 || dut.i_rx.seen_q))) ||
                          dut.i_rx.ended_q || dut.i_rx.info_q || dut.i_rx.timing_q);
@@ -118,11 +120,13 @@ module asi_xact_fv import asi_map_pkg::*; (
       GapIs_A:   assert ((state != StGapOk || gap_q == GapIsOk) && (state != StGapNorsp || gap_q == GapIsNorsp) &&
                          (state != StGapErr || gap_q == GapIsErr) && (state != StIdle || gap_q == GapIsIdle));
       Timer_A:   assert (!(state inside {StGapOk, StGapNorsp, StGapErr, StIdle}) ||
-                         (int'(dut.time_q) == since && (since < need || (state == StGapErr && dec_q <= 2'd2 && since <= Answer + Delay + int'(dec_q)))));
+                         (int'(dut.time_q) == since && (since < need ||
+                          (state == StGapErr && dec_q <= 2'd2 && since <= Answer + Delay + int'(dec_q)))));
       Armed_A:   assert (!dut.armed_q || state == StOff || (state inside {StGapOk, StGapNorsp, StGapErr, StIdle} &&
                          since > need - 96 - 2));
       Arms_A:    assert (!(state inside {StGapOk, StGapNorsp, StGapErr, StIdle}) || dut.armed_q ||
                          since <= need - 96 - 2 || dec_q == 2'd1);
+      Lead_A:    assert (state != StReady || (!offered_q && dut.time_q <= 10'd96));  // P_TX_BIAS, then it starts
       Ready_A:   assert (state != StReady || since + 1 >= need || served_q);
       Wait_A:    assert (int'(dut.babble_q) == int'(wait_q));
       Waited_A:  assert ((state inside {StIdle, StGapErr}) ? int'(wait_q) <= Babble - 2 : wait_q == '0);
