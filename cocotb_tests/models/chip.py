@@ -277,5 +277,6 @@ class Chip:
     def telegrams(self):
         """The records since the last call of this."""
         self.settle()
-        out, self.monitor.telegrams = self.monitor.telegrams, []
+        out = list(self.monitor.telegrams)
+        self.monitor.telegrams.clear()  # in place: the monitor appends to this list
         return out
