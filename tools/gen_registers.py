@@ -19,10 +19,10 @@ from peakrdl_regblock import RegblockExporter
 from peakrdl_regblock.cpuif.passthrough import PassthroughCpuif
 from peakrdl_regblock.udps import ALL_UDPS
 from systemrdl import RDLCompiler
-from systemrdl.node import RegNode
+from systemrdl.node import RegfileNode, RegNode
 
 ROOT = Path(__file__).resolve().parent.parent
-MAPS = ("asi_regs", "asi_link_ram", "asi_host")
+MAPS = ("asi_regs", "asi_link_ram", "asi_stats", "asi_ring", "asi_host")
 ENUMS = ("error_class_e", "phase_e")
 NOTE = "Generated from rdl/asi.rdl by tools/gen_registers.py (make regs). Do not edit."
 
@@ -46,23 +46,32 @@ def compile_rdl():
 
 
 def constants(maps):
-    """Yield (name, value) of every word offset and field position, e.g. LINK_SLOT, 0x000; names may repeat."""
+    """Yield (name, value) of every word offset and field position, e.g. LINK_SLOT, 0x000; names may repeat.
+
+    A register file (STAT, TELEGRAM) has the offset of its first element here, and those of its words inside it."""
     for name, node in maps.items():
         prefix = name.removeprefix("asi_").removesuffix("_ram").upper()
-        for reg in node.registers():
-            yield f"{prefix}_{reg.inst_name}", reg.raw_absolute_address if reg.is_array else reg.absolute_address
-        seen = set()
-        for reg in node.registers():
-            kind = reg.type_name or reg.inst_name
-            if kind in seen:
-                continue
-            seen.add(kind)
-            stem = kind.removesuffix("_r").upper() if kind.endswith("_r") else f"{prefix}_{reg.inst_name}"
-            if stem == "WORD":
-                continue
-            for field in reg.fields():
-                yield f"{stem}_{field.inst_name.upper()}_LSB", field.lsb
-                yield f"{stem}_{field.inst_name.upper()}_W", field.width
+        for child in node.children(unroll=False):
+            yield f"{prefix}_{child.inst_name}", child.raw_absolute_address if child.is_array else child.absolute_address
+        for child in node.children(unroll=False):
+            if isinstance(child, RegNode):
+                yield from fields(child, prefix)
+        for child in node.children(unroll=False):
+            if isinstance(child, RegfileNode):
+                stem = child.type_name.removesuffix("_r").upper()
+                for reg in child.registers():
+                    yield f"{stem}_{reg.inst_name}", reg.raw_address_offset
+                    yield from fields(reg, stem)
+
+
+def fields(reg, prefix):
+    """Yield (name, value) of a register's fields; a named type is known by its name, others by prefix and register."""
+    kind = reg.type_name or reg.inst_name
+    stem = kind.removesuffix("_r").upper() if kind.endswith("_r") else f"{prefix}_{reg.inst_name}"
+    if stem != "WORD":
+        for field in reg.fields():
+            yield f"{stem}_{field.inst_name.upper()}_LSB", field.lsb
+            yield f"{stem}_{field.inst_name.upper()}_W", field.width
 
 
 def sv_package(maps, enums):

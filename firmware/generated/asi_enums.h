@@ -12,7 +12,8 @@ typedef enum {
     ASI_ERR_END_BIT = 6, /**< The pulse at 36 us is not positive. */
     ASI_ERR_PARITY = 7, /**< Odd number of ones. */
     ASI_ERR_LENGTH = 8, /**< A pulse after the end pulse, before the length window closed. */
-    ASI_ERR_EARLY = 9, /**< A pulse before P_RX_OPEN: foreign sender, or our own request was too long. */
+    ASI_ERR_EARLY = 9, /**< A pulse before P_RX_OPEN: foreign sender. */
+    ASI_ERR_BAD_MASTER = 10, /**< Bad master telegram: our own request did not come back from the line as it was sent. */
     ASI_ERR_ABORTED = 15, /**< Power fail or stop while the call was open. */
 } asi_error_class_t;
 typedef enum {

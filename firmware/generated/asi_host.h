@@ -28,6 +28,9 @@ extern "C" {
 #define HOST_CTRL_R__AUTO_ADDRESS_ENABLE_bm 0x8
 #define HOST_CTRL_R__AUTO_ADDRESS_ENABLE_bp 3
 #define HOST_CTRL_R__AUTO_ADDRESS_ENABLE_bw 1
+#define HOST_CTRL_R__MONITOR_bm 0x10
+#define HOST_CTRL_R__MONITOR_bp 4
+#define HOST_CTRL_R__MONITOR_bw 1
 
 // reg - flags_r
 #define FLAGS_R__CONFIG_OK_bm 0x1
@@ -77,6 +80,83 @@ extern "C" {
 #define PARAM_R__VALUE_bp 0
 #define PARAM_R__VALUE_bw 4
 
+// reg - stat_r::COUNT
+#define STAT_R__COUNT__VALUE_bm 0xffffffff
+#define STAT_R__COUNT__VALUE_bp 0
+#define STAT_R__COUNT__VALUE_bw 32
+
+// reg - stat_r::REPEAT_OK
+#define STAT_R__REPEAT_OK__VALUE_bm 0xffffffff
+#define STAT_R__REPEAT_OK__VALUE_bp 0
+#define STAT_R__REPEAT_OK__VALUE_bw 32
+
+// reg - stat_r::REPEAT_FAILED
+#define STAT_R__REPEAT_FAILED__VALUE_bm 0xffffffff
+#define STAT_R__REPEAT_FAILED__VALUE_bp 0
+#define STAT_R__REPEAT_FAILED__VALUE_bw 32
+
+// reg - stat_r::DELAY
+#define STAT_R__DELAY__MIN_bm 0xffff
+#define STAT_R__DELAY__MIN_bp 0
+#define STAT_R__DELAY__MIN_bw 16
+#define STAT_R__DELAY__MAX_bm 0xffff0000
+#define STAT_R__DELAY__MAX_bp 16
+#define STAT_R__DELAY__MAX_bw 16
+
+// reg - stat_r::DELAY_SUM
+#define STAT_R__DELAY_SUM__VALUE_bm 0xffffffff
+#define STAT_R__DELAY_SUM__VALUE_bp 0
+#define STAT_R__DELAY_SUM__VALUE_bw 32
+
+// reg - stat_r::DEVIATION
+#define STAT_R__DEVIATION__CLOCKS_bm 0xff
+#define STAT_R__DEVIATION__CLOCKS_bp 0
+#define STAT_R__DEVIATION__CLOCKS_bw 8
+#define STAT_R__DEVIATION__LATE_bm 0x100
+#define STAT_R__DEVIATION__LATE_bp 8
+#define STAT_R__DEVIATION__LATE_bw 1
+
+// regfile - stat_r
+typedef struct __attribute__ ((__packed__)) {
+    uint32_t COUNT[11];
+    uint32_t REPEAT_OK;
+    uint32_t REPEAT_FAILED;
+    uint32_t DELAY;
+    uint32_t DELAY_SUM;
+    uint32_t DEVIATION;
+} stat_r_t;
+
+// reg - telegram_r::TIME
+#define TELEGRAM_R__TIME__TIME_bm 0xffffffff
+#define TELEGRAM_R__TIME__TIME_bp 0
+#define TELEGRAM_R__TIME__TIME_bw 32
+
+// reg - record_r
+#define RECORD_R__DATA_bm 0x7ff
+#define RECORD_R__DATA_bp 0
+#define RECORD_R__DATA_bw 11
+#define RECORD_R__REQUEST_bm 0x800
+#define RECORD_R__REQUEST_bp 11
+#define RECORD_R__REQUEST_bw 1
+#define RECORD_R__ERROR_bm 0xf000
+#define RECORD_R__ERROR_bp 12
+#define RECORD_R__ERROR_bw 4
+#define RECORD_R__DEVIATION_bm 0xff0000
+#define RECORD_R__DEVIATION_bp 16
+#define RECORD_R__DEVIATION_bw 8
+#define RECORD_R__LATE_bm 0x1000000
+#define RECORD_R__LATE_bp 24
+#define RECORD_R__LATE_bw 1
+#define RECORD_R__LOST_bm 0x2000000
+#define RECORD_R__LOST_bp 25
+#define RECORD_R__LOST_bw 1
+
+// regfile - telegram_r
+typedef struct __attribute__ ((__packed__)) {
+    uint32_t TIME;
+    uint32_t RECORD;
+} telegram_r_t;
+
 // addrmap - asi_host
 typedef struct __attribute__ ((__packed__)) {
     uint32_t MAGIC;
@@ -110,10 +190,18 @@ typedef struct __attribute__ ((__packed__)) {
     uint8_t PP[64];
     uint8_t PI[64];
     uint8_t PECHO[64];
+    uint32_t LINE_FAULTS;
+    uint32_t RING_HEAD;
+    uint32_t RING_TAIL;
+    uint32_t RING_LOST;
+    uint32_t CLOCK_MHZ;
+    uint8_t RESERVED_2d4_fff[0xd2c];
+    stat_r_t STAT[64];
+    telegram_r_t RING[512];
 } asi_host_t;
 
 
-static_assert(sizeof(asi_host_t) == 0x2c0, "Packing error");
+static_assert(sizeof(asi_host_t) == 0x3000, "Packing error");
 
 #ifdef __cplusplus
 }

@@ -45,6 +45,9 @@ extern "C" {
 #define REQUEST_R__RETRIES_bm 0x3000
 #define REQUEST_R__RETRIES_bp 12
 #define REQUEST_R__RETRIES_bw 2
+#define REQUEST_R__SEL_bm 0x4000
+#define REQUEST_R__SEL_bp 14
+#define REQUEST_R__SEL_bw 1
 #define REQUEST_R__TAG_bm 0xff0000
 #define REQUEST_R__TAG_bp 16
 #define REQUEST_R__TAG_bw 8

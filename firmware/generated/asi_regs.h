@@ -87,11 +87,15 @@ extern "C" {
 #define ASI_REGS__EVENT__HOST_ATTN_bp 5
 #define ASI_REGS__EVENT__HOST_ATTN_bw 1
 #define ASI_REGS__EVENT__HOST_ATTN_reset 0x0
+#define ASI_REGS__EVENT__EFAULT_CHANGE_bm 0x40
+#define ASI_REGS__EVENT__EFAULT_CHANGE_bp 6
+#define ASI_REGS__EVENT__EFAULT_CHANGE_bw 1
+#define ASI_REGS__EVENT__EFAULT_CHANGE_reset 0x0
 
 // reg - asi_regs::EVENT_EN
-#define ASI_REGS__EVENT_EN__MASK_bm 0x3f
+#define ASI_REGS__EVENT_EN__MASK_bm 0x7f
 #define ASI_REGS__EVENT_EN__MASK_bp 0
-#define ASI_REGS__EVENT_EN__MASK_bw 6
+#define ASI_REGS__EVENT_EN__MASK_bw 7
 #define ASI_REGS__EVENT_EN__MASK_reset 0x0
 
 // reg - asi_regs::TIME
@@ -112,9 +116,9 @@ extern "C" {
 #define ASI_REGS__HOST_IRQ__SET_reset 0x0
 
 // reg - asi_regs::WAIT
-#define ASI_REGS__WAIT__PENDING_bm 0x3f
+#define ASI_REGS__WAIT__PENDING_bm 0x7f
 #define ASI_REGS__WAIT__PENDING_bp 0
-#define ASI_REGS__WAIT__PENDING_bw 6
+#define ASI_REGS__WAIT__PENDING_bw 7
 
 // reg - asi_regs::SPI_DATA
 #define ASI_REGS__SPI_DATA__DATA_bm 0xff
@@ -131,6 +135,47 @@ extern "C" {
 #define ASI_REGS__SPI_CTRL__BUSY_bp 1
 #define ASI_REGS__SPI_CTRL__BUSY_bw 1
 
+// reg - asi_regs::LATCH
+#define ASI_REGS__LATCH__APF_bm 0x1
+#define ASI_REGS__LATCH__APF_bp 0
+#define ASI_REGS__LATCH__APF_bw 1
+#define ASI_REGS__LATCH__APF_reset 0x0
+#define ASI_REGS__LATCH__EFAULT_bm 0x2
+#define ASI_REGS__LATCH__EFAULT_bp 1
+#define ASI_REGS__LATCH__EFAULT_bw 1
+#define ASI_REGS__LATCH__EFAULT_reset 0x0
+#define ASI_REGS__LATCH__JABBER_bm 0x4
+#define ASI_REGS__LATCH__JABBER_bp 2
+#define ASI_REGS__LATCH__JABBER_bw 1
+#define ASI_REGS__LATCH__JABBER_reset 0x0
+
+// reg - asi_regs::MONITOR_CTRL
+#define ASI_REGS__MONITOR_CTRL__ENABLE_bm 0x1
+#define ASI_REGS__MONITOR_CTRL__ENABLE_bp 0
+#define ASI_REGS__MONITOR_CTRL__ENABLE_bw 1
+#define ASI_REGS__MONITOR_CTRL__ENABLE_reset 0x0
+#define ASI_REGS__MONITOR_CTRL__CLEAR_bm 0x2
+#define ASI_REGS__MONITOR_CTRL__CLEAR_bp 1
+#define ASI_REGS__MONITOR_CTRL__CLEAR_bw 1
+#define ASI_REGS__MONITOR_CTRL__CLEAR_reset 0x0
+#define ASI_REGS__MONITOR_CTRL__TAIL_bm 0xff00
+#define ASI_REGS__MONITOR_CTRL__TAIL_bp 8
+#define ASI_REGS__MONITOR_CTRL__TAIL_bw 8
+#define ASI_REGS__MONITOR_CTRL__TAIL_reset 0x0
+
+// reg - asi_regs::MONITOR
+#define ASI_REGS__MONITOR__HEAD_bm 0xff
+#define ASI_REGS__MONITOR__HEAD_bp 0
+#define ASI_REGS__MONITOR__HEAD_bw 8
+#define ASI_REGS__MONITOR__LOST_bm 0xffff0000
+#define ASI_REGS__MONITOR__LOST_bp 16
+#define ASI_REGS__MONITOR__LOST_bw 16
+
+// reg - asi_regs::CLOCK
+#define ASI_REGS__CLOCK__MHZ_bm 0xff
+#define ASI_REGS__CLOCK__MHZ_bp 0
+#define ASI_REGS__CLOCK__MHZ_bw 8
+
 // addrmap - asi_regs
 typedef struct __attribute__ ((__packed__)) {
     uint32_t ID;
@@ -145,10 +190,14 @@ typedef struct __attribute__ ((__packed__)) {
     uint32_t WAIT;
     uint32_t SPI_DATA;
     uint32_t SPI_CTRL;
+    uint32_t LATCH;
+    uint32_t MONITOR_CTRL;
+    uint32_t MONITOR;
+    uint32_t CLOCK;
 } asi_regs_t;
 
 
-static_assert(sizeof(asi_regs_t) == 0x30, "Packing error");
+static_assert(sizeof(asi_regs_t) == 0x40, "Packing error");
 
 #ifdef __cplusplus
 }

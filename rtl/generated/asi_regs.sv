@@ -78,6 +78,10 @@ module asi_regs (
         logic WAIT;
         logic SPI_DATA;
         logic SPI_CTRL;
+        logic LATCH;
+        logic MONITOR_CTRL;
+        logic MONITOR;
+        logic CLOCK;
     } decoded_reg_strb_t;
     decoded_reg_strb_t decoded_reg_strb;
     logic decoded_err;
@@ -104,6 +108,10 @@ module asi_regs (
         decoded_reg_strb.WAIT = cpuif_req_masked & (cpuif_addr == 6'h24) & !cpuif_req_is_wr;
         decoded_reg_strb.SPI_DATA = cpuif_req_masked & (cpuif_addr == 6'h28);
         decoded_reg_strb.SPI_CTRL = cpuif_req_masked & (cpuif_addr == 6'h2c);
+        decoded_reg_strb.LATCH = cpuif_req_masked & (cpuif_addr == 6'h30);
+        decoded_reg_strb.MONITOR_CTRL = cpuif_req_masked & (cpuif_addr == 6'h34);
+        decoded_reg_strb.MONITOR = cpuif_req_masked & (cpuif_addr == 6'h38) & !cpuif_req_is_wr;
+        decoded_reg_strb.CLOCK = cpuif_req_masked & (cpuif_addr == 6'h3c) & !cpuif_req_is_wr;
         decoded_err = '0;
     end
 
@@ -171,10 +179,14 @@ module asi_regs (
                 logic next;
                 logic load_next;
             } host_attn;
+            struct {
+                logic next;
+                logic load_next;
+            } efault_change;
         } EVENT;
         struct {
             struct {
-                logic [5:0] next;
+                logic [6:0] next;
                 logic load_next;
             } mask;
         } EVENT_EN;
@@ -202,6 +214,34 @@ module asi_regs (
                 logic load_next;
             } select;
         } SPI_CTRL;
+        struct {
+            struct {
+                logic next;
+                logic load_next;
+            } apf;
+            struct {
+                logic next;
+                logic load_next;
+            } efault;
+            struct {
+                logic next;
+                logic load_next;
+            } jabber;
+        } LATCH;
+        struct {
+            struct {
+                logic next;
+                logic load_next;
+            } enable;
+            struct {
+                logic next;
+                logic load_next;
+            } clear;
+            struct {
+                logic [7:0] next;
+                logic load_next;
+            } tail;
+        } MONITOR_CTRL;
     } field_combo_t;
     field_combo_t field_combo;
 
@@ -247,10 +287,13 @@ module asi_regs (
             struct {
                 logic value;
             } host_attn;
+            struct {
+                logic value;
+            } efault_change;
         } EVENT;
         struct {
             struct {
-                logic [5:0] value;
+                logic [6:0] value;
             } mask;
         } EVENT_EN;
         struct {
@@ -273,6 +316,28 @@ module asi_regs (
                 logic value;
             } select;
         } SPI_CTRL;
+        struct {
+            struct {
+                logic value;
+            } apf;
+            struct {
+                logic value;
+            } efault;
+            struct {
+                logic value;
+            } jabber;
+        } LATCH;
+        struct {
+            struct {
+                logic value;
+            } enable;
+            struct {
+                logic value;
+            } clear;
+            struct {
+                logic [7:0] value;
+            } tail;
+        } MONITOR_CTRL;
     } field_storage_t;
     field_storage_t field_storage;
 
@@ -571,14 +636,40 @@ module asi_regs (
         end
     end
     assign hwif_out.EVENT.host_attn.value = field_storage.EVENT.host_attn.value;
+    // Field: asi_regs.EVENT.efault_change
+    always_comb begin
+        automatic logic [0:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.EVENT.efault_change.value;
+        load_next_c = '0;
+        if(hwif_in.EVENT.efault_change.hwset) begin // HW Set
+            next_c = '1;
+            load_next_c = '1;
+        end else if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
+            next_c = field_storage.EVENT.efault_change.value & ~(decoded_wr_data[6:6] & decoded_wr_biten[6:6]);
+            load_next_c = '1;
+        end
+        field_combo.EVENT.efault_change.next = next_c;
+        field_combo.EVENT.efault_change.load_next = load_next_c;
+    end
+    always_ff @(posedge clk) begin
+        if(rst) begin
+            field_storage.EVENT.efault_change.value <= 1'h0;
+        end else begin
+            if(field_combo.EVENT.efault_change.load_next) begin
+                field_storage.EVENT.efault_change.value <= field_combo.EVENT.efault_change.next;
+            end
+        end
+    end
+    assign hwif_out.EVENT.efault_change.value = field_storage.EVENT.efault_change.value;
     // Field: asi_regs.EVENT_EN.mask
     always_comb begin
-        automatic logic [5:0] next_c;
+        automatic logic [6:0] next_c;
         automatic logic load_next_c;
         next_c = field_storage.EVENT_EN.mask.value;
         load_next_c = '0;
         if(decoded_reg_strb.EVENT_EN && decoded_req_is_wr) begin // SW write
-            next_c = (field_storage.EVENT_EN.mask.value & ~decoded_wr_biten[5:0]) | (decoded_wr_data[5:0] & decoded_wr_biten[5:0]);
+            next_c = (field_storage.EVENT_EN.mask.value & ~decoded_wr_biten[6:0]) | (decoded_wr_data[6:0] & decoded_wr_biten[6:0]);
             load_next_c = '1;
         end
         field_combo.EVENT_EN.mask.next = next_c;
@@ -586,7 +677,7 @@ module asi_regs (
     end
     always_ff @(posedge clk) begin
         if(rst) begin
-            field_storage.EVENT_EN.mask.value <= 6'h0;
+            field_storage.EVENT_EN.mask.value <= 7'h0;
         end else begin
             if(field_combo.EVENT_EN.mask.load_next) begin
                 field_storage.EVENT_EN.mask.value <= field_combo.EVENT_EN.mask.next;
@@ -693,6 +784,156 @@ module asi_regs (
         end
     end
     assign hwif_out.SPI_CTRL.select.value = field_storage.SPI_CTRL.select.value;
+    // Field: asi_regs.LATCH.apf
+    always_comb begin
+        automatic logic [0:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.LATCH.apf.value;
+        load_next_c = '0;
+        if(hwif_in.LATCH.apf.hwset) begin // HW Set
+            next_c = '1;
+            load_next_c = '1;
+        end else if(decoded_reg_strb.LATCH && decoded_req_is_wr) begin // SW write 1 clear
+            next_c = field_storage.LATCH.apf.value & ~(decoded_wr_data[0:0] & decoded_wr_biten[0:0]);
+            load_next_c = '1;
+        end
+        field_combo.LATCH.apf.next = next_c;
+        field_combo.LATCH.apf.load_next = load_next_c;
+    end
+    always_ff @(posedge clk) begin
+        if(rst) begin
+            field_storage.LATCH.apf.value <= 1'h0;
+        end else begin
+            if(field_combo.LATCH.apf.load_next) begin
+                field_storage.LATCH.apf.value <= field_combo.LATCH.apf.next;
+            end
+        end
+    end
+    assign hwif_out.LATCH.apf.value = field_storage.LATCH.apf.value;
+    // Field: asi_regs.LATCH.efault
+    always_comb begin
+        automatic logic [0:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.LATCH.efault.value;
+        load_next_c = '0;
+        if(hwif_in.LATCH.efault.hwset) begin // HW Set
+            next_c = '1;
+            load_next_c = '1;
+        end else if(decoded_reg_strb.LATCH && decoded_req_is_wr) begin // SW write 1 clear
+            next_c = field_storage.LATCH.efault.value & ~(decoded_wr_data[1:1] & decoded_wr_biten[1:1]);
+            load_next_c = '1;
+        end
+        field_combo.LATCH.efault.next = next_c;
+        field_combo.LATCH.efault.load_next = load_next_c;
+    end
+    always_ff @(posedge clk) begin
+        if(rst) begin
+            field_storage.LATCH.efault.value <= 1'h0;
+        end else begin
+            if(field_combo.LATCH.efault.load_next) begin
+                field_storage.LATCH.efault.value <= field_combo.LATCH.efault.next;
+            end
+        end
+    end
+    assign hwif_out.LATCH.efault.value = field_storage.LATCH.efault.value;
+    // Field: asi_regs.LATCH.jabber
+    always_comb begin
+        automatic logic [0:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.LATCH.jabber.value;
+        load_next_c = '0;
+        if(hwif_in.LATCH.jabber.hwset) begin // HW Set
+            next_c = '1;
+            load_next_c = '1;
+        end else if(decoded_reg_strb.LATCH && decoded_req_is_wr) begin // SW write 1 clear
+            next_c = field_storage.LATCH.jabber.value & ~(decoded_wr_data[2:2] & decoded_wr_biten[2:2]);
+            load_next_c = '1;
+        end
+        field_combo.LATCH.jabber.next = next_c;
+        field_combo.LATCH.jabber.load_next = load_next_c;
+    end
+    always_ff @(posedge clk) begin
+        if(rst) begin
+            field_storage.LATCH.jabber.value <= 1'h0;
+        end else begin
+            if(field_combo.LATCH.jabber.load_next) begin
+                field_storage.LATCH.jabber.value <= field_combo.LATCH.jabber.next;
+            end
+        end
+    end
+    assign hwif_out.LATCH.jabber.value = field_storage.LATCH.jabber.value;
+    // Field: asi_regs.MONITOR_CTRL.enable
+    always_comb begin
+        automatic logic [0:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.MONITOR_CTRL.enable.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.MONITOR_CTRL && decoded_req_is_wr) begin // SW write
+            next_c = (field_storage.MONITOR_CTRL.enable.value & ~decoded_wr_biten[0:0]) | (decoded_wr_data[0:0] & decoded_wr_biten[0:0]);
+            load_next_c = '1;
+        end
+        field_combo.MONITOR_CTRL.enable.next = next_c;
+        field_combo.MONITOR_CTRL.enable.load_next = load_next_c;
+    end
+    always_ff @(posedge clk) begin
+        if(rst) begin
+            field_storage.MONITOR_CTRL.enable.value <= 1'h0;
+        end else begin
+            if(field_combo.MONITOR_CTRL.enable.load_next) begin
+                field_storage.MONITOR_CTRL.enable.value <= field_combo.MONITOR_CTRL.enable.next;
+            end
+        end
+    end
+    assign hwif_out.MONITOR_CTRL.enable.value = field_storage.MONITOR_CTRL.enable.value;
+    // Field: asi_regs.MONITOR_CTRL.clear
+    always_comb begin
+        automatic logic [0:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.MONITOR_CTRL.clear.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.MONITOR_CTRL && decoded_req_is_wr) begin // SW write
+            next_c = (field_storage.MONITOR_CTRL.clear.value & ~decoded_wr_biten[1:1]) | (decoded_wr_data[1:1] & decoded_wr_biten[1:1]);
+            load_next_c = '1;
+        end else begin // singlepulse clears back to 0
+            next_c = '0;
+            load_next_c = '1;
+        end
+        field_combo.MONITOR_CTRL.clear.next = next_c;
+        field_combo.MONITOR_CTRL.clear.load_next = load_next_c;
+    end
+    always_ff @(posedge clk) begin
+        if(rst) begin
+            field_storage.MONITOR_CTRL.clear.value <= 1'h0;
+        end else begin
+            if(field_combo.MONITOR_CTRL.clear.load_next) begin
+                field_storage.MONITOR_CTRL.clear.value <= field_combo.MONITOR_CTRL.clear.next;
+            end
+        end
+    end
+    assign hwif_out.MONITOR_CTRL.clear.value = field_storage.MONITOR_CTRL.clear.value;
+    // Field: asi_regs.MONITOR_CTRL.tail
+    always_comb begin
+        automatic logic [7:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.MONITOR_CTRL.tail.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.MONITOR_CTRL && decoded_req_is_wr) begin // SW write
+            next_c = (field_storage.MONITOR_CTRL.tail.value & ~decoded_wr_biten[15:8]) | (decoded_wr_data[15:8] & decoded_wr_biten[15:8]);
+            load_next_c = '1;
+        end
+        field_combo.MONITOR_CTRL.tail.next = next_c;
+        field_combo.MONITOR_CTRL.tail.load_next = load_next_c;
+    end
+    always_ff @(posedge clk) begin
+        if(rst) begin
+            field_storage.MONITOR_CTRL.tail.value <= 8'h0;
+        end else begin
+            if(field_combo.MONITOR_CTRL.tail.load_next) begin
+                field_storage.MONITOR_CTRL.tail.value <= field_combo.MONITOR_CTRL.tail.next;
+            end
+        end
+    end
+    assign hwif_out.MONITOR_CTRL.tail.value = field_storage.MONITOR_CTRL.tail.value;
 
     //--------------------------------------------------------------------------
     // Write response
@@ -741,9 +982,10 @@ module asi_regs (
             readback_data_var[3] = field_storage.EVENT.apf_change.value;
             readback_data_var[4] = field_storage.EVENT.tick.value;
             readback_data_var[5] = field_storage.EVENT.host_attn.value;
+            readback_data_var[6] = field_storage.EVENT.efault_change.value;
         end
         if(rd_mux_addr == 6'h14) begin
-            readback_data_var[5:0] = field_storage.EVENT_EN.mask.value;
+            readback_data_var[6:0] = field_storage.EVENT_EN.mask.value;
         end
         if(rd_mux_addr == 6'h18) begin
             readback_data_var[31:0] = hwif_in.TIME.us.next;
@@ -755,7 +997,7 @@ module asi_regs (
             readback_data_var[0] = field_storage.HOST_IRQ.set.value;
         end
         if(rd_mux_addr == 6'h24) begin
-            readback_data_var[5:0] = hwif_in.WAIT.pending.next;
+            readback_data_var[6:0] = hwif_in.WAIT.pending.next;
         end
         if(rd_mux_addr == 6'h28) begin
             readback_data_var[7:0] = field_storage.SPI_DATA.data.value;
@@ -763,6 +1005,23 @@ module asi_regs (
         if(rd_mux_addr == 6'h2c) begin
             readback_data_var[0] = field_storage.SPI_CTRL.select.value;
             readback_data_var[1] = hwif_in.SPI_CTRL.busy.next;
+        end
+        if(rd_mux_addr == 6'h30) begin
+            readback_data_var[0] = field_storage.LATCH.apf.value;
+            readback_data_var[1] = field_storage.LATCH.efault.value;
+            readback_data_var[2] = field_storage.LATCH.jabber.value;
+        end
+        if(rd_mux_addr == 6'h34) begin
+            readback_data_var[0] = field_storage.MONITOR_CTRL.enable.value;
+            readback_data_var[1] = field_storage.MONITOR_CTRL.clear.value;
+            readback_data_var[15:8] = field_storage.MONITOR_CTRL.tail.value;
+        end
+        if(rd_mux_addr == 6'h38) begin
+            readback_data_var[7:0] = hwif_in.MONITOR.head.next;
+            readback_data_var[31:16] = hwif_in.MONITOR.lost.next;
+        end
+        if(rd_mux_addr == 6'h3c) begin
+            readback_data_var[7:0] = hwif_in.CLOCK.mhz.next;
         end
         readback_data = readback_data_var;
         readback_done = decoded_req & ~decoded_req_is_wr;

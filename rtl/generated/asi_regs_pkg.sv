@@ -5,7 +5,7 @@ package asi_regs_pkg;
 
     localparam ASI_REGS_DATA_WIDTH = 32;
     localparam ASI_REGS_MIN_ADDR_WIDTH = 6;
-    localparam ASI_REGS_SIZE = 'h30;
+    localparam ASI_REGS_SIZE = 'h40;
 
     typedef struct {
         logic next;
@@ -55,12 +55,17 @@ package asi_regs_pkg;
     } asi_regs__EVENT__host_attn__in_t;
 
     typedef struct {
+        logic hwset;
+    } asi_regs__EVENT__efault_change__in_t;
+
+    typedef struct {
         asi_regs__EVENT__cycle_done__in_t cycle_done;
         asi_regs__EVENT__batch_done__in_t batch_done;
         asi_regs__EVENT__slave_lost__in_t slave_lost;
         asi_regs__EVENT__apf_change__in_t apf_change;
         asi_regs__EVENT__tick__in_t tick;
         asi_regs__EVENT__host_attn__in_t host_attn;
+        asi_regs__EVENT__efault_change__in_t efault_change;
     } asi_regs__EVENT__in_t;
 
     typedef struct {
@@ -72,7 +77,7 @@ package asi_regs_pkg;
     } asi_regs__TIME__in_t;
 
     typedef struct {
-        logic [5:0] next;
+        logic [6:0] next;
     } asi_regs__WAIT__pending__in_t;
 
     typedef struct {
@@ -97,12 +102,54 @@ package asi_regs_pkg;
     } asi_regs__SPI_CTRL__in_t;
 
     typedef struct {
+        logic hwset;
+    } asi_regs__LATCH__apf__in_t;
+
+    typedef struct {
+        logic hwset;
+    } asi_regs__LATCH__efault__in_t;
+
+    typedef struct {
+        logic hwset;
+    } asi_regs__LATCH__jabber__in_t;
+
+    typedef struct {
+        asi_regs__LATCH__apf__in_t apf;
+        asi_regs__LATCH__efault__in_t efault;
+        asi_regs__LATCH__jabber__in_t jabber;
+    } asi_regs__LATCH__in_t;
+
+    typedef struct {
+        logic [7:0] next;
+    } asi_regs__MONITOR__head__in_t;
+
+    typedef struct {
+        logic [15:0] next;
+    } asi_regs__MONITOR__lost__in_t;
+
+    typedef struct {
+        asi_regs__MONITOR__head__in_t head;
+        asi_regs__MONITOR__lost__in_t lost;
+    } asi_regs__MONITOR__in_t;
+
+    typedef struct {
+        logic [7:0] next;
+    } asi_regs__CLOCK__mhz__in_t;
+
+    typedef struct {
+        asi_regs__CLOCK__mhz__in_t mhz;
+    } asi_regs__CLOCK__in_t;
+
+    typedef struct {
         asi_regs__STATUS__in_t STATUS;
         asi_regs__EVENT__in_t EVENT;
         asi_regs__TIME__in_t TIME;
         asi_regs__WAIT__in_t WAIT;
         asi_regs__SPI_DATA__in_t SPI_DATA;
         asi_regs__SPI_CTRL__in_t SPI_CTRL;
+        asi_regs__LATCH__in_t LATCH;
+        asi_regs__MONITOR__in_t MONITOR;
+        asi_regs__CLOCK__in_t CLOCK;
     } asi_regs__in_t;
 
     typedef struct {
@@ -167,16 +214,21 @@ package asi_regs_pkg;
     } asi_regs__EVENT__host_attn__out_t;
 
     typedef struct {
+        logic value;
+    } asi_regs__EVENT__efault_change__out_t;
+
+    typedef struct {
         asi_regs__EVENT__cycle_done__out_t cycle_done;
         asi_regs__EVENT__batch_done__out_t batch_done;
         asi_regs__EVENT__slave_lost__out_t slave_lost;
         asi_regs__EVENT__apf_change__out_t apf_change;
         asi_regs__EVENT__tick__out_t tick;
         asi_regs__EVENT__host_attn__out_t host_attn;
+        asi_regs__EVENT__efault_change__out_t efault_change;
     } asi_regs__EVENT__out_t;
 
     typedef struct {
-        logic [5:0] value;
+        logic [6:0] value;
     } asi_regs__EVENT_EN__mask__out_t;
 
     typedef struct {
@@ -217,6 +269,42 @@ package asi_regs_pkg;
     } asi_regs__SPI_CTRL__out_t;
 
     typedef struct {
+        logic value;
+    } asi_regs__LATCH__apf__out_t;
+
+    typedef struct {
+        logic value;
+    } asi_regs__LATCH__efault__out_t;
+
+    typedef struct {
+        logic value;
+    } asi_regs__LATCH__jabber__out_t;
+
+    typedef struct {
+        asi_regs__LATCH__apf__out_t apf;
+        asi_regs__LATCH__efault__out_t efault;
+        asi_regs__LATCH__jabber__out_t jabber;
+    } asi_regs__LATCH__out_t;
+
+    typedef struct {
+        logic value;
+    } asi_regs__MONITOR_CTRL__enable__out_t;
+
+    typedef struct {
+        logic value;
+    } asi_regs__MONITOR_CTRL__clear__out_t;
+
+    typedef struct {
+        logic [7:0] value;
+    } asi_regs__MONITOR_CTRL__tail__out_t;
+
+    typedef struct {
+        asi_regs__MONITOR_CTRL__enable__out_t enable;
+        asi_regs__MONITOR_CTRL__clear__out_t clear;
+        asi_regs__MONITOR_CTRL__tail__out_t tail;
+    } asi_regs__MONITOR_CTRL__out_t;
+
+    typedef struct {
         asi_regs__CTRL__out_t CTRL;
         asi_regs__BATCH__out_t BATCH;
         asi_regs__EVENT__out_t EVENT;
@@ -225,6 +313,8 @@ package asi_regs_pkg;
         asi_regs__HOST_IRQ__out_t HOST_IRQ;
         asi_regs__SPI_DATA__out_t SPI_DATA;
         asi_regs__SPI_CTRL__out_t SPI_CTRL;
+        asi_regs__LATCH__out_t LATCH;
+        asi_regs__MONITOR_CTRL__out_t MONITOR_CTRL;
     } asi_regs__out_t;
 
     typedef enum logic [2:0] {

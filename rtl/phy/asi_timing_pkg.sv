@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // asi_timing_pkg: every time of the line, in nanoseconds, and the one way to turn it into clocks.
-// Names and values: requirements LT-001 .. LT-014 (docs/requirements.md). Anchors are pulse starts.
+// Names and values: requirements LT-001 .. LT-016 (docs/requirements.md). Anchors are pulse starts.
 package asi_timing_pkg;
   localparam int unsigned HalfBitNs   = 3_000;       // half a bit, the pulse grid
   localparam int unsigned WinEarlyNs  = 875;         // P_WIN_EARLY: a pulse may start this early
@@ -9,6 +9,7 @@ package asi_timing_pkg;
   localparam int unsigned RxQuietNs   = 6_000;       // P_RX_QUIET: silence after the end pulse of an answer
   localparam int unsigned RxOpenNs    = 12_000;      // P_RX_OPEN: earliest answer after the last request pulse
   localparam int unsigned TxMaskNs    = 4_500;       // P_TX_MASK: own last pulse until here, its echo is masked
+  localparam int unsigned EchoMaxNs   = 3_000;       // P_ECHO_MAX: latest own pulse on the receive pins after its edge
   localparam int unsigned RxTimeoutNs = 66_000;      // P_RX_TIMEOUT: latest answer after the last request pulse
   localparam int unsigned GapOkNs     = 18_500;      // P_GAP_OK: last answer pulse to the next request
   localparam int unsigned GapNorspNs  = 6_000;       // P_GAP_NORSP: end of the time-out to the next request
@@ -18,6 +19,10 @@ package asi_timing_pkg;
   localparam int unsigned TxBiasNs    = 12_000;      // P_TX_BIAS: longest lead of tx_en before the first edge
   localparam int unsigned ApfOnNs     = 1_000_000;   // P_APF_ON: power low this long -> APF
   localparam int unsigned ApfOkNs     = 10_000_000;  // P_APF_OK: power good this long -> no APF
+  localparam int unsigned JabberNs    = 300_000;     // P_JABBER: a sender on for longer is cut off
+  localparam int unsigned PauseNs     = 7_500;       // P_PAUSE: no pulse for this long is a pause
+  localparam int unsigned VthClearNs  = 2_000;       // P_VTH_CLEAR: then the held amplitude is dropped for this long
+  localparam int unsigned EfNs        = 1_000_000_000;  // P_EF: earth fault present or gone for this long
   localparam int unsigned ApfDipNs    = 6_000;       // states of the power input shorter than this are ignored
 
   // Clocks in a time; ClkHz is a whole multiple of 8 MHz, so every time above is a whole count.
