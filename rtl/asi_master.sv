@@ -102,10 +102,12 @@ module asi_master #(
     .GapErrNs(GapErrNs), .BabbleMaxNs(BabbleMaxNs), .IdleStartNs(IdleStartNs), .TxBiasNs(TxBiasNs)
   ) u_xact (
     .clk_i, .rst_i, .enable_i(enable),
-    .req_valid_i(req_valid), .req_ready_o(req_ready), .req_call_i(req_call), .req_retries_i(req_retries),
-    .req_no_reply_i(req_no_reply),
+    .req_valid_i(req_valid), .req_ready_o(req_ready), .req_call_i(req_call), .req_sel_i(1'b0),
+    .req_retries_i(req_retries), .req_no_reply_i(req_no_reply),
     .res_valid_o(res_valid), .res_last_o(res_last), .res_first_o(res_first), .res_data_o(res_data),
     .res_repeats_o(res_repeats), .sent_o(sent), .repeat_o(is_repeat),
+    .att_valid_o(), .att_index_o(), .att_class_o(), .att_repeat_o(), .att_final_o(), .att_delay_o(), .att_dev_o(),
+    .att_dev_late_o(), .pulse_n_o(), .pulse_p_o(),
     .rx_p_i, .rx_n_i, .tx_man_o, .tx_en_o
   );
 
