@@ -51,6 +51,10 @@ module asi_master #(
   logic        jabber, mon_enable, mon_clear;
   logic [7:0]  mon_tail, mon_head;
   logic [15:0] mon_lost;
+  logic        stat_req, stat_we, ring_req, ring_we;
+  logic [9:0]  stat_addr;
+  logic [8:0]  ring_addr;
+  logic [31:0] stat_wdata, stat_rdata, ring_wdata;
   logic        mem_req, mem_we;
   logic [7:0]  mem_addr;
   logic [31:0] mem_wdata, mem_rdata;
@@ -62,6 +66,9 @@ module asi_master #(
     .clk_i, .rst_i,
     .host_req_i, .host_we_i, .host_addr_i, .host_be_i, .host_wdata_i, .host_rdata_o, .host_ready_o, .host_irq_o,
     .spi_sck_o, .spi_cs_no, .spi_mosi_o, .spi_miso_i,
+    .stat_req_i(stat_req), .stat_we_i(stat_we), .stat_addr_i(stat_addr), .stat_wdata_i(stat_wdata),
+    .stat_rdata_o(stat_rdata),
+    .ring_req_i(ring_req), .ring_we_i(ring_we), .ring_addr_i(ring_addr), .ring_wdata_i(ring_wdata),
     .seq_req_i(mem_req), .seq_we_i(mem_we), .seq_addr_i(mem_addr), .seq_wdata_i(mem_wdata), .seq_rdata_o(mem_rdata),
     .tick_us_o(tick_us), .line_en_o(line_en), .cycle_en_o(cycle_en), .two_extra_o(two_extra),
     .out_hold_o(out_hold), .min_cycle_us_o(min_cycle_us), .batch_start_o(batch_start), .batch_len_o(batch_len),
@@ -75,11 +82,15 @@ module asi_master #(
 
   // ---------------------------------------------------------------- the line
   logic        enable;                                // LT-011: nothing starts without power
-  logic        req_valid, req_ready, req_no_reply, res_valid, sent, is_repeat;
+  logic        req_valid, req_ready, req_no_reply, req_sel, res_valid, sent, is_repeat;
   logic [10:0] req_call;
   logic [1:0]  req_retries, res_repeats;
   logic [3:0]  res_data;
-  asi_map_pkg::error_class_e res_last, res_first;
+  asi_map_pkg::error_class_e res_last, res_first, att_class;
+  logic        att_valid, att_repeat, att_final, att_dev_late, pulse_n, pulse_p;
+  logic [5:0]  att_index;
+  logic [15:0] att_delay;
+  logic [7:0]  att_dev;
 
   assign enable  = line_en & ~apf;
   assign phase_o = cycle_busy ? slot_phase : exec_phase;
@@ -88,7 +99,7 @@ module asi_master #(
     .clk_i, .rst_i,
     .mem_req_o(mem_req), .mem_we_o(mem_we), .mem_addr_o(mem_addr), .mem_wdata_o(mem_wdata), .mem_rdata_i(mem_rdata),
     .req_valid_o(req_valid), .req_ready_i(req_ready), .req_call_o(req_call), .req_retries_o(req_retries),
-    .req_no_reply_o(req_no_reply),
+    .req_no_reply_o(req_no_reply), .req_sel_o(req_sel),
     .res_valid_i(res_valid), .res_last_i(res_last), .res_first_i(res_first), .res_data_i(res_data),
     .res_repeats_i(res_repeats), .sent_i(sent), .repeat_i(is_repeat),
     .enable_i(enable), .cycle_en_i(cycle_en), .two_extra_i(two_extra), .out_hold_i(out_hold),
@@ -102,12 +113,13 @@ module asi_master #(
     .GapErrNs(GapErrNs), .BabbleMaxNs(BabbleMaxNs), .IdleStartNs(IdleStartNs), .TxBiasNs(TxBiasNs)
   ) u_xact (
     .clk_i, .rst_i, .enable_i(enable),
-    .req_valid_i(req_valid), .req_ready_o(req_ready), .req_call_i(req_call), .req_sel_i(1'b0),
+    .req_valid_i(req_valid), .req_ready_o(req_ready), .req_call_i(req_call), .req_sel_i(req_sel),
     .req_retries_i(req_retries), .req_no_reply_i(req_no_reply),
     .res_valid_o(res_valid), .res_last_o(res_last), .res_first_o(res_first), .res_data_o(res_data),
     .res_repeats_o(res_repeats), .sent_o(sent), .repeat_o(is_repeat),
-    .att_valid_o(), .att_index_o(), .att_class_o(), .att_repeat_o(), .att_final_o(), .att_delay_o(), .att_dev_o(),
-    .att_dev_late_o(), .pulse_n_o(), .pulse_p_o(),
+    .att_valid_o(att_valid), .att_index_o(att_index), .att_class_o(att_class), .att_repeat_o(att_repeat),
+    .att_final_o(att_final), .att_delay_o(att_delay), .att_dev_o(att_dev), .att_dev_late_o(att_dev_late),
+    .pulse_n_o(pulse_n), .pulse_p_o(pulse_p),
     .rx_p_i, .rx_n_i, .tx_man_o, .tx_en_o
   );
 
@@ -115,11 +127,19 @@ module asi_master #(
     .clk_i, .rst_i, .tick_i(tick_us), .apf_ni, .efault_i, .apf_o(apf), .efault_o(efault)
   );
 
-  logic unused_monitor;                               // until asi_monitor is here
-  assign jabber   = 1'b0;
-  assign mon_head = mon_tail;
-  assign mon_lost = '0;
-  assign unused_monitor = mon_enable ^ mon_clear;
+  asi_stats u_stats (
+    .clk_i, .rst_i,
+    .att_valid_i(att_valid), .att_index_i(att_index), .att_class_i(att_class), .att_repeat_i(att_repeat),
+    .att_final_i(att_final), .att_delay_i(att_delay), .att_dev_i(att_dev), .att_dev_late_i(att_dev_late),
+    .mem_req_o(stat_req), .mem_we_o(stat_we), .mem_addr_o(stat_addr), .mem_wdata_o(stat_wdata),
+    .mem_rdata_i(stat_rdata)
+  );
+
+  asi_monitor #(.ClkHz(ClkHz), .RxOpenNs(RxOpenNs), .RxTimeoutNs(RxTimeoutNs)) u_monitor (
+    .clk_i, .rst_i, .n_start_i(pulse_n), .p_start_i(pulse_p), .enable_i(mon_enable), .clear_i(mon_clear),
+    .tail_i(mon_tail), .head_o(mon_head), .lost_o(mon_lost),
+    .mem_req_o(ring_req), .mem_we_o(ring_we), .mem_addr_o(ring_addr), .mem_wdata_o(ring_wdata)
+  );
 
 `ifndef SYNTHESIS
   // readable telegrams in waveforms; without waves the simulator removes it

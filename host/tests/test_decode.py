@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 
 from asi import decode as decoding
 from asi.bench import name_waves, open_bench
-from asi.capture import Analog, CaptureError, Comparators, Info, Manchester, Options
+from asi.capture import Analog, CaptureError, Comparators, Info, Manchester, Options, Sink
 from asi.cli import QUICK_SETTLE_NS, app
 from asi.plant import Faults, load_plant
 from asi.run import Runner
@@ -260,17 +260,17 @@ def test_short_pulses_are_ignored(tmp_path):
         for width, count in ((749, 0), (750, 1)):
             seen = []
             if front == "p":
-                part = Comparators(lambda t, polarity: seen.append((t, polarity)), 750)
+                part = Comparators(Sink(lambda t, polarity: seen.append((t, polarity))), 750)
                 for t, p in ((0, 0), (1_000, 1), (1_000 + width, 0)):
                     part.levels(t, p, 0)
             else:
-                part = Manchester(lambda t, polarity: seen.append((t, polarity)), 750)
+                part = Manchester(Sink(lambda t, polarity: seen.append((t, polarity))), 750)
                 for t, level in ((0, 1), (1_000, 0), (1_000 + width, 1)):
                     part.level(t, level)
             part.settle(1_500 + width)
             assert seen == [(1_000, 1 if front == "p" else -1)] * count
     seen = []
-    part = Comparators(lambda t, polarity: seen.append((t, polarity)), 750)
+    part = Comparators(Sink(lambda t, polarity: seen.append((t, polarity))), 750)
     for t, n in ((0, 0), (1_000, 1), (2_000, 0), (2_749, 1), (3_500, 0), (9_000, 0)):
         part.levels(t, 0, n)
     assert seen == [(1_000, -1)]
@@ -697,7 +697,7 @@ def test_memory_does_not_grow(tmp_path):
 def test_analog_swing_below_arm_is_silence():
     """DE-011: noise below the least amplitude starts nothing."""
     seen = []
-    front = Analog(lambda t, polarity: seen.append(t), 750)
+    front = Analog(Sink(lambda t, polarity: seen.append(t)), 750)
     rng = random.Random(3)
     for k in range(20_000):
         front.sample(k * 100.0, 30 + rng.uniform(-0.5, 0.5))

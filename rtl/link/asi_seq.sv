@@ -25,6 +25,7 @@ module asi_seq
   output logic [10:0] req_call_o,
   output logic [1:0]  req_retries_o,
   output logic        req_no_reply_o,
+  output logic        req_sel_o,          // the call is for a B slave; nothing here depends on it
   input  logic        res_valid_i,        // pulse: the accepted call is over
   input  logic [3:0]  res_last_i, res_first_i, res_data_i,
   input  logic [1:0]  res_repeats_i,
@@ -73,7 +74,7 @@ module asi_seq
   logic        open_d, open_q;              // a call is offered or on the line
   logic        valid_d, valid_q;            // ... offered
   logic [10:0] call_d, call_q;
-  logic        no_reply_d, no_reply_q;
+  logic        no_reply_d, no_reply_q, sel_d, sel_q;
   logic [1:0]  retries_d, retries_q;
   logic [7:0]  tag_d, tag_q;
   logic        pend_d, pend_q;              // a management request is pending
@@ -307,15 +308,17 @@ module asi_seq
     endcase
 
     // request registers
-    call_d = call_q;  no_reply_d = no_reply_q;  retries_d = retries_q;  tag_d = tag_q;
+    call_d = call_q;  sel_d = sel_q;  no_reply_d = no_reply_q;  retries_d = retries_q;  tag_d = tag_q;
     if (load) begin
       call_d     = mem_rdata_i[RequestCallLsb +: RequestCallW];
+      sel_d      = mem_rdata_i[RequestSelLsb];
       no_reply_d = mem_rdata_i[RequestNoReplyLsb];
       retries_d  = mem_rdata_i[RequestRetriesLsb +: RequestRetriesW];
       tag_d      = mem_rdata_i[RequestTagLsb +: RequestTagW];
     end
     if (load_dexg) begin
       call_d     = {1'b0, nxt_q[4:0], 1'b0, ext_q ? !nxt_q[5] : nibble[3], nibble[2:0]};
+      sel_d      = nxt_q[5];
       no_reply_d = 1'b0;
       retries_d  = 2'(DexgRetry);
       tag_d      = '0;
@@ -327,6 +330,7 @@ module asi_seq
   assign req_call_o     = call_q;
   assign req_retries_o  = retries_q;
   assign req_no_reply_o = no_reply_q;
+  assign req_sel_o      = sel_q;
   assign batch_busy_o   = state_q != StIdle && is_batch;
   assign cycle_busy_o   = state_q != StIdle && !is_batch;
   assign sync_o         = sent_i && first_q && !repeat_i;
@@ -347,7 +351,7 @@ module asi_seq
     // no reset needed: StIdle or the step that uses them sets these
     {kind_q, cur_q, nxt_q, nxt_v_q, wrap_q, cnt_q} <= {kind_d, cur_d, nxt_d, nxt_v_d, wrap_d, cnt_d};
     {a_q, b_q, ext_q, ext_b_q, pend_q, lost_q} <= {a_d, b_d, ext_d, ext_b_d, pend_d, lost_d};
-    {call_q, no_reply_q, retries_q, tag_q} <= {call_d, no_reply_d, retries_d, tag_d};
+    {call_q, sel_q, no_reply_q, retries_q, tag_q} <= {call_d, sel_d, no_reply_d, retries_d, tag_d};
     {last_q, rfirst_q, data_q, repeats_q} <= {last_d, rfirst_d, data_d, repeats_d};
     {us_q, paced_q} <= {us_d, paced_d};
   end
@@ -359,7 +363,7 @@ module asi_seq
   localparam int unsigned MaxOfferClocks = 38;
   int unsigned since_q;
   logic        timed_q;
-  logic [13:0] offered_q;  // the request may not change while it is offered
+  logic [14:0] offered_q;  // the request may not change while it is offered
   logic        held_q;
   logic        begun;      // a cycle begins; for the test bench
   assign begun = state_q == StPace && state_d == StFetch;
@@ -370,10 +374,10 @@ module asi_seq
                                   : res_valid_i && state_q == StWait && !sent_q && !again_q);
     since_q <= timed_q ? since_q + 1 : 1;
     held_q    <= !rst_i && req_valid_o && !req_ready_i;
-    offered_q <= {call_q, retries_q, no_reply_q};
+    offered_q <= {call_q, sel_q, retries_q, no_reply_q};
     if (!rst_i) begin
       Offer_A:    assert (!timed_q || since_q <= MaxOfferClocks);
-      Held_A:     assert (!held_q || !enable_i || (req_valid_o && offered_q == {call_q, retries_q, no_reply_q}));
+      Held_A:     assert (!held_q || !enable_i || (req_valid_o && offered_q == {call_q, sel_q, retries_q, no_reply_q}));
       OneCall_A:  assert (!offer || !open_q);
       Result_A:   assert (!res_valid_i || (open_q && !valid_q && !res_q));
       Books_A:    assert (!res_q || state_q inside {StScan, StCopy, StLoad, StWait, StTally});

@@ -25,18 +25,20 @@ module asi_fabric #(
   output logic            rom_req_o,
   input  logic [31:0]     ram_rdata_i, rom_rdata_i,
   // targets with a ready of their own
-  output logic            dpm_req_o, link_req_o, regs_req_o,
-  input  logic [31:0]     dpm_rdata_i, link_rdata_i, regs_rdata_i,
-  input  logic            dpm_ready_i, link_ready_i, regs_ready_i
+  output logic            dpm_req_o, link_req_o, stat_req_o, ring_req_o, regs_req_o,
+  input  logic [31:0]     dpm_rdata_i, link_rdata_i, stat_rdata_i, ring_rdata_i, regs_rdata_i,
+  input  logic            dpm_ready_i, link_ready_i, stat_ready_i, ring_ready_i, regs_ready_i
 );
   // ---- where
-  logic d_ram, d_rom, d_dpm, d_link, d_regs, d_none, i_ram, i_rom;
+  logic d_ram, d_rom, d_dpm, d_link, d_stat, d_ring, d_regs, d_none, i_ram, i_rom;
   assign d_ram  = dbus_addr_i < 30'(RamWords);
   assign d_rom  = BootFromFlash && dbus_addr_i[31:10] == 22'h04_0000;   // 0x1000_0000, 1 KB
   assign d_dpm  = dbus_addr_i[31:14] == 18'h1_0000;      // 0x4000_0000, 16 KB
   assign d_regs = dbus_addr_i[31:6]  == 26'h200_0000;    // 0x8000_0000, 64 B
   assign d_link = dbus_addr_i[31:10] == 22'h20_0040;     // 0x8001_0000, 1 KB
-  assign d_none = ~(d_ram | d_rom | d_dpm | d_regs | d_link);
+  assign d_stat = dbus_addr_i[31:13] == 19'h4_0010;      // 0x8002_0000, 4 KB, and again with clearing reads
+  assign d_ring = dbus_addr_i[31:11] == 21'h10_0060;     // 0x8003_0000, 2 KB
+  assign d_none = ~(d_ram | d_rom | d_dpm | d_regs | d_link | d_stat | d_ring);
   assign i_ram  = ibus_addr_i < 30'(RamWords);
   assign i_rom  = BootFromFlash && ibus_addr_i[31:10] == 22'h04_0000;
 
@@ -62,12 +64,15 @@ module asi_fabric #(
 
   assign dpm_req_o  = dbus_req_i & d_dpm;
   assign link_req_o = dbus_req_i & d_link;
+  assign stat_req_o = dbus_req_i & d_stat;
+  assign ring_req_o = dbus_req_i & d_ring;
   assign regs_req_o = dbus_req_i & d_regs;
   assign dbus_ready_o = d_done_q | (d_dpm & dpm_ready_i) | (d_link & link_ready_i) | (d_regs & regs_ready_i) |
-                        (dbus_req_i & d_none);
+                        (d_stat & stat_ready_i) | (d_ring & ring_ready_i) | (dbus_req_i & d_none);
   assign dbus_rdata_o = ({32{d_ram}}  & ram_rdata_i)  | ({32{d_rom}}  & rom_rdata_i)  |
                         ({32{d_dpm}}  & dpm_rdata_i)  | ({32{d_link}} & link_rdata_i) |
-                        ({32{d_regs}} & regs_rdata_i);
+                        ({32{d_regs}} & regs_rdata_i) |
+                        ({32{d_stat}} & stat_rdata_i) | ({32{d_ring}} & ring_rdata_i);
 
 `ifndef SYNTHESIS
   logic        d_held_q, i_held_q;
@@ -83,7 +88,7 @@ module asi_fabric #(
     if (!rst_i) begin
       DHeld_A:  assert (!d_held_q || (dbus_req_i && d_q == {dbus_we_i, dbus_addr_i}));
       IHeld_A:  assert (!i_held_q || (ibus_req_i && i_q == ibus_addr_i));
-      OneD_A:   assert ($onehot0({d_ram, d_rom, d_dpm, d_link, d_regs}));
+      OneD_A:   assert ($onehot0({d_ram, d_rom, d_dpm, d_link, d_stat, d_ring, d_regs}));
       IWait_A:  assert (i_wait_q <= 2'd2);           // data accesses cannot starve the fetches
       Both_C:   cover (d_go && ibus_req_i);
       Nothing_C: cover (dbus_req_i && d_none);

@@ -18,6 +18,14 @@ module asi_soc #(
   // flash
   output logic        spi_sck_o, spi_cs_no, spi_mosi_o,
   input  logic        spi_miso_i,
+  // engines: ports of the shared memories, word addresses, read data one clock after the request
+  input  logic        stat_req_i, stat_we_i,
+  input  logic [9:0]  stat_addr_i,
+  input  logic [31:0] stat_wdata_i,
+  output logic [31:0] stat_rdata_o,
+  input  logic        ring_req_i, ring_we_i,
+  input  logic [8:0]  ring_addr_i,
+  input  logic [31:0] ring_wdata_i,
   // sequencer: link RAM port, control, state, events
   input  logic        seq_req_i, seq_we_i,
   input  logic [7:0]  seq_addr_i,
@@ -50,8 +58,9 @@ module asi_soc #(
   logic [31:0]     irdata, drdata, dwdata;
   logic [3:0]      dbe;
   logic            ram_req, ram_we, rom_req, dpm_req, dpm_ready, link_req, link_ready, regs_req, regs_ready;
+  logic            stat_req, stat_ready, ring_req, ring_ready;
   logic [RamW-1:0] ram_addr;
-  logic [31:0]     ram_rdata, rom_rdata, dpm_rdata, regs_rdata;
+  logic [31:0]     ram_rdata, rom_rdata, dpm_rdata, regs_rdata, ring_rdata;
 
   asi_core #(.ResetVector(ResetVector)) u_core (
     .clk_i, .rst_i, .irq_i(irq),
@@ -66,9 +75,11 @@ module asi_soc #(
     .dbus_req_i(dreq), .dbus_we_i(dwe), .dbus_addr_i(daddr), .dbus_rdata_o(drdata), .dbus_ready_o(dready),
     .ram_req_o(ram_req), .ram_we_o(ram_we), .ram_addr_o(ram_addr), .rom_req_o(rom_req),
     .ram_rdata_i(ram_rdata), .rom_rdata_i(rom_rdata),
-    .dpm_req_o(dpm_req), .link_req_o(link_req), .regs_req_o(regs_req),
-    .dpm_rdata_i(dpm_rdata), .link_rdata_i(seq_rdata_o), .regs_rdata_i(regs_rdata),
-    .dpm_ready_i(dpm_ready), .link_ready_i(link_ready), .regs_ready_i(regs_ready)
+    .dpm_req_o(dpm_req), .link_req_o(link_req), .stat_req_o(stat_req), .ring_req_o(ring_req), .regs_req_o(regs_req),
+    .dpm_rdata_i(dpm_rdata), .link_rdata_i(seq_rdata_o), .stat_rdata_i(stat_rdata_o), .ring_rdata_i(ring_rdata),
+    .regs_rdata_i(regs_rdata),
+    .dpm_ready_i(dpm_ready), .link_ready_i(link_ready), .stat_ready_i(stat_ready), .ring_ready_i(ring_ready),
+    .regs_ready_i(regs_ready)
   );
 
   asi_ram #(.Words(RamWords), .InitFile(FirmwareHex), .InitPlusarg("firmware")) u_ram (
@@ -87,11 +98,26 @@ module asi_soc #(
     end
   endgenerate
 
-  asi_link_mem u_link_mem (
+  asi_shared_mem #(.Words(256)) u_link_mem (
     .clk_i, .rst_i,
-    .core_req_i(link_req), .core_we_i(dwe), .core_be_i(dbe), .core_addr_i(daddr[9:2]), .core_wdata_i(dwdata),
-    .core_ready_o(link_ready),
-    .seq_req_i, .seq_we_i, .seq_addr_i, .seq_wdata_i, .rdata_o(seq_rdata_o)
+    .core_req_i(link_req), .core_we_i(dwe), .core_clear_i(1'b0), .core_be_i(dbe), .core_addr_i(daddr[9:2]),
+    .core_wdata_i(dwdata), .core_ready_o(link_ready),
+    .eng_req_i(seq_req_i), .eng_we_i(seq_we_i), .eng_addr_i(seq_addr_i), .eng_wdata_i(seq_wdata_i),
+    .rdata_o(seq_rdata_o)
+  );
+  asi_shared_mem #(.Words(1024)) u_stat_mem (         // bit 12: reads clear the word
+    .clk_i, .rst_i,
+    .core_req_i(stat_req), .core_we_i(dwe), .core_clear_i(daddr[12]), .core_be_i(dbe), .core_addr_i(daddr[11:2]),
+    .core_wdata_i(dwdata), .core_ready_o(stat_ready),
+    .eng_req_i(stat_req_i), .eng_we_i(stat_we_i), .eng_addr_i(stat_addr_i), .eng_wdata_i(stat_wdata_i),
+    .rdata_o(stat_rdata_o)
+  );
+  asi_shared_mem #(.Words(512)) u_ring_mem (
+    .clk_i, .rst_i,
+    .core_req_i(ring_req), .core_we_i(dwe), .core_clear_i(1'b0), .core_be_i(dbe), .core_addr_i(daddr[10:2]),
+    .core_wdata_i(dwdata), .core_ready_o(ring_ready),
+    .eng_req_i(ring_req_i), .eng_we_i(ring_we_i), .eng_addr_i(ring_addr_i), .eng_wdata_i(ring_wdata_i),
+    .rdata_o(ring_rdata)
   );
 
   // ---------------------------------------------------------------- host window

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 FILTER_NS = 750          # shorter pulses are ignored (RX-009)
+MAN_PULSE_NS = 1_500      # raw pulse made of an edge of MAN
 LOWEST_RATE_HZ = 2_000_000
 ARM_V = 0.6              # the first pulse of a telegram must exceed this; the least legal one is 1.5 V
 TELEGRAM_GAP_NS = 13_500  # two bit times and P_WIN_LATE: a telegram that lost one pulse still has no longer gap
@@ -50,10 +51,13 @@ class Options:
 
 @dataclass
 class Sink:
-    """Where a capture goes. pulse(t_ns, polarity); begin(t_ns): the capture starts; phase(t_ns, number): phase_o."""
+    """Where a capture goes. pulse(t_ns, polarity); begin(t_ns): the capture starts; phase(t_ns, number): phase_o.
+
+    raw(t_ns, polarity, width_ns): what the comparators showed, before the filter, each pulse when it is over."""
     pulse: Callable[[float, int], None]
     begin: Callable[[float], None] = lambda t_ns: None
     phase: Callable[[float, int], None] = lambda t_ns, number: None
+    raw: Callable[[float, int, float], None] | None = None
 
 
 @dataclass
@@ -95,12 +99,20 @@ class _Filter:
 class Comparators:
     """Levels of the two comparators -> pulses."""
 
-    def __init__(self, pulse: Callable[[float, int], None], filter_ns: float, invert: bool = False):
-        self._pulse, self._sign = pulse, -1 if invert else 1
+    def __init__(self, sink: Sink, filter_ns: float, invert: bool = False):
+        self._pulse, self._raw, self._sign = sink.pulse, sink.raw, -1 if invert else 1
         self._p, self._n = _Filter(filter_ns), _Filter(filter_ns)
+        self._rose: dict[int, float] = {}    # raw: polarity -> start of its pulse
 
     def levels(self, t_ns: float, p: int, n: int) -> None:
         self.settle(t_ns)
+        if self._raw:
+            for level, polarity in ((p, self._sign), (n, -self._sign)):
+                if level and polarity not in self._rose:
+                    self._rose[polarity] = t_ns
+                elif not level and polarity in self._rose:
+                    start = self._rose.pop(polarity)
+                    self._raw(start, polarity, t_ns - start)
         self._p.level(t_ns, p)
         self._n.level(t_ns, n)
 
@@ -126,8 +138,8 @@ class Comparators:
 class Manchester:
     """MAN, idle high -> pulses: falling edge negative, rising positive (TL-005)."""
 
-    def __init__(self, pulse: Callable[[float, int], None], filter_ns: float, invert: bool = False):
-        self._pulse, self._invert, self._man = pulse, invert, _Filter(filter_ns)
+    def __init__(self, sink: Sink, filter_ns: float, invert: bool = False):
+        self._pulse, self._raw, self._invert, self._man = sink.pulse, sink.raw, invert, _Filter(filter_ns)
 
     def level(self, t_ns: float, man: int) -> None:
         self.settle(t_ns)
@@ -137,6 +149,8 @@ class Manchester:
         if self._man.due(t_ns):
             since = self._man.flip()
             self._pulse(since, 1 if self._man.state else -1)
+            if self._raw:
+                self._raw(since, 1 if self._man.state else -1, MAN_PULSE_NS)
 
 
 class Analog:
@@ -146,9 +160,8 @@ class Analog:
     followed to its peak; half of that is the threshold of both polarities until the next pause.
     """
 
-    def __init__(self, pulse: Callable[[float, int], None], filter_ns: float, invert: bool = False,
-                 arm_v: float = ARM_V):
-        self._out = Comparators(pulse, filter_ns)
+    def __init__(self, sink: Sink, filter_ns: float, invert: bool = False, arm_v: float = ARM_V):
+        self._out = Comparators(sink, filter_ns)
         self._sign, self._arm = -1.0 if invert else 1.0, arm_v
         self._first: list[tuple[float, float]] | None = []   # samples before the DC part is known
         self._base = 0.0
@@ -228,11 +241,11 @@ class _Front:
         self.kind = kind
         filter_ns = max(0.0, FILTER_NS - sample_ns)  # a sampled pulse may look one sample shorter than it is
         if kind == "pulses":
-            self._end = Comparators(sink.pulse, filter_ns, options.invert)
+            self._end = Comparators(sink, filter_ns, options.invert)
         elif kind == "man":
-            self._end = Manchester(sink.pulse, filter_ns, options.invert)
+            self._end = Manchester(sink, filter_ns, options.invert)
         else:
-            self._end = Analog(sink.pulse, filter_ns, options.invert, options.arm_v)
+            self._end = Analog(sink, filter_ns, options.invert, options.arm_v)
         self._idle = 0 if options.invert else 1
 
     def values(self, t_ns: float, values: Sequence[Any]) -> None:

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from asi import regmap
 from asi.plant import Codes, Host
-from asi.regmap import Phase
+from asi.regmap import ErrorClass, Phase
 
 MAGIC = 0x4D49_5341  # 'ASIM'
 IN_TRIES = 50        # an image alone is published faster than one try reads it
@@ -22,6 +22,43 @@ COUNTERS = ("cycles", "sent", "repeated", "failed", "time_us")
 
 class WindowError(Exception):
     """The window does not behave: never consistent."""
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What the chip counted for one index (ST-001, ST-002). Times in ns; None while there is no good answer."""
+    classes: dict[ErrorClass, int]      # attempts by class; those that never happened are left out
+    repeat_ok: int
+    repeat_failed: int
+    delay_min_ns: float | None
+    delay_mean_ns: float | None
+    delay_max_ns: float | None
+    deviation_ns: float | None          # largest distance of a pulse start from the grid, late is positive
+
+    @property
+    def requests(self) -> int:
+        return sum(self.classes.values())
+
+
+@dataclass(frozen=True)
+class RingRecord:
+    """One telegram of the passive monitor (ST-006). t_ns: first pulse, wraps after 2^32 * 125 ns."""
+    t_ns: int
+    request: bool
+    data: int            # request: CB A4..A0 I4..I0; answer: I3..I0
+    error_class: ErrorClass
+    deviation_ns: float  # late is positive
+    lost: bool           # telegrams before this one were lost
+
+
+LINE_FAULTS = ("apf", "efault", "jabber")
+RING_RECORDS = 512
+RING_TICK_NS = 125
+
+
+def _bits(word: int, name: str) -> int:
+    """Field `name` (e.g. RECORD_DATA) of a word."""
+    return word >> getattr(regmap, f"{name}_LSB") & (1 << getattr(regmap, f"{name}_W")) - 1
 
 
 class HostPort(Protocol):
@@ -110,6 +147,47 @@ class HostWindow:
         words = self._words(base, 16)
         return [words[index // 4] >> 8 * (index % 4) & 15 for index in range(64)]
 
+    def clock_mhz(self) -> int:
+        return self.port.host_read(regmap.HOST_CLOCK_MHZ)
+
+    def statistics(self, index: int) -> Statistics:
+        """Counters of one index; the firmware copies them to the window every 65 ms (ST-009)."""
+        words = self._words(regmap.HOST_STAT + 0x40 * index, 16)
+        count = words[regmap.STAT_COUNT // 4:][:regmap.STAT_REPEAT_OK // 4]
+        delay, deviation = words[regmap.STAT_DELAY // 4], words[regmap.STAT_DEVIATION // 4]
+        good, ns = count[ErrorClass.OK], 1000 / self.clock_mhz()
+        late = 1 if _bits(deviation, "STAT_DEVIATION_LATE") else -1
+        return Statistics(
+            {ErrorClass(k): n for k, n in enumerate(count) if n},
+            words[regmap.STAT_REPEAT_OK // 4], words[regmap.STAT_REPEAT_FAILED // 4],
+            _bits(delay, "STAT_DELAY_MIN") * ns if good else None,
+            words[regmap.STAT_DELAY_SUM // 4] * ns / good if good else None,
+            _bits(delay, "STAT_DELAY_MAX") * ns if good else None,
+            late * _bits(deviation, "STAT_DEVIATION_CLOCKS") * ns if good else None)
+
+    def line_faults(self) -> dict[str, tuple[bool, bool]]:
+        """apf, efault, jabber -> (there now, seen since the last commit) (LT-017)."""
+        word = self.port.host_read(regmap.HOST_LINE_FAULTS)
+        return {name: (bool(word >> k & 1), bool(word >> 8 + k & 1)) for k, name in enumerate(LINE_FAULTS)}
+
+    def monitored(self) -> list[RingRecord]:
+        """Take all telegrams that the passive monitor has recorded (ST-006); set_control(monitor=True) starts it."""
+        read, ns = self.port.host_read, 1000 / self.clock_mhz()
+        head, tail, out = read(regmap.HOST_RING_HEAD), read(regmap.HOST_RING_TAIL), []
+        while tail != head:
+            time, word = self._words(regmap.HOST_RING + 8 * tail, 2)
+            late = 1 if _bits(word, "RECORD_LATE") else -1
+            out.append(RingRecord(time * RING_TICK_NS, bool(_bits(word, "RECORD_REQUEST")), _bits(word, "RECORD_DATA"),
+                                  ErrorClass(_bits(word, "RECORD_ERROR")), late * _bits(word, "RECORD_DEVIATION") * ns,
+                                  bool(_bits(word, "RECORD_LOST"))))
+            tail = (tail + 1) % RING_RECORDS
+        self.port.host_write(regmap.HOST_RING_TAIL, tail)
+        return out
+
+    def monitor_lost(self) -> int:
+        """Telegrams that found the ring full (ST-008)."""
+        return self.port.host_read(regmap.HOST_RING_LOST)
+
     # ------------------------------------------------------------ writing
     def set_output(self, index: int, nibble: int) -> None:
         """Host level; goes out with the next cycle."""
@@ -121,7 +199,7 @@ class HostWindow:
         self.port.host_write(regmap.HOST_IRQ_ACK, 1, 15)
 
     def set_control(self, **bits: bool) -> int:
-        """Change bits of HOST_CTRL (protected_mode, offline, data_exchange, auto_address_enable); -> sequence."""
+        """Change bits of HOST_CTRL (protected_mode, offline, data_exchange, auto_address_enable, monitor); -> sequence."""
         for name, on in bits.items():
             bit = 1 << getattr(regmap, f"HOST_CTRL_{name.upper()}_LSB")
             self.control = self.control | bit if on else self.control & ~bit
