@@ -82,11 +82,12 @@ module asi_soc #(
     end
   endgenerate
 
-  asi_link_mem u_link_mem (
+  asi_shared_mem #(.Words(256)) u_link_mem (
     .clk_i, .rst_i,
-    .core_req_i(link_req), .core_we_i(dwe), .core_be_i(dbe), .core_addr_i(daddr[9:2]), .core_wdata_i(dwdata),
-    .core_ready_o(link_ready),
-    .seq_req_i, .seq_we_i, .seq_addr_i, .seq_wdata_i, .rdata_o(seq_rdata_o)
+    .core_req_i(link_req), .core_we_i(dwe), .core_clear_i(1'b0), .core_be_i(dbe), .core_addr_i(daddr[9:2]),
+    .core_wdata_i(dwdata), .core_ready_o(link_ready),
+    .eng_req_i(seq_req_i), .eng_we_i(seq_we_i), .eng_addr_i(seq_addr_i), .eng_wdata_i(seq_wdata_i),
+    .rdata_o(seq_rdata_o)
   );
 
   // ---------------------------------------------------------------- host window
