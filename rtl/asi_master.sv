@@ -48,6 +48,9 @@ module asi_master #(
   logic [6:0]  batch_len;
   logic [2:0]  exec_phase, slot_phase;
   logic        batch_busy, cycle_busy, cycle_done, batch_done, slave_lost, apf, efault;
+  logic        jabber, mon_enable, mon_clear;
+  logic [7:0]  mon_tail, mon_head;
+  logic [15:0] mon_lost;
   logic        mem_req, mem_we;
   logic [7:0]  mem_addr;
   logic [31:0] mem_wdata, mem_rdata;
@@ -64,7 +67,9 @@ module asi_master #(
     .out_hold_o(out_hold), .min_cycle_us_o(min_cycle_us), .batch_start_o(batch_start), .batch_len_o(batch_len),
     .exec_phase_o(exec_phase),
     .batch_busy_i(batch_busy), .cycle_busy_i(cycle_busy), .apf_i(apf), .efault_i(efault),
-    .cycle_done_i(cycle_done), .batch_done_i(batch_done), .slave_lost_i(slave_lost),
+    .cycle_done_i(cycle_done), .batch_done_i(batch_done), .slave_lost_i(slave_lost), .jabber_i(jabber),
+    .mon_enable_o(mon_enable), .mon_clear_o(mon_clear), .mon_tail_o(mon_tail), .mon_head_i(mon_head),
+    .mon_lost_i(mon_lost),
     .core_wait_o
   );
 
@@ -97,16 +102,24 @@ module asi_master #(
     .GapErrNs(GapErrNs), .BabbleMaxNs(BabbleMaxNs), .IdleStartNs(IdleStartNs), .TxBiasNs(TxBiasNs)
   ) u_xact (
     .clk_i, .rst_i, .enable_i(enable),
-    .req_valid_i(req_valid), .req_ready_o(req_ready), .req_call_i(req_call), .req_retries_i(req_retries),
-    .req_no_reply_i(req_no_reply),
+    .req_valid_i(req_valid), .req_ready_o(req_ready), .req_call_i(req_call), .req_sel_i(1'b0),
+    .req_retries_i(req_retries), .req_no_reply_i(req_no_reply),
     .res_valid_o(res_valid), .res_last_o(res_last), .res_first_o(res_first), .res_data_o(res_data),
     .res_repeats_o(res_repeats), .sent_o(sent), .repeat_o(is_repeat),
+    .att_valid_o(), .att_index_o(), .att_class_o(), .att_repeat_o(), .att_final_o(), .att_delay_o(), .att_dev_o(),
+    .att_dev_late_o(), .pulse_n_o(), .pulse_p_o(),
     .rx_p_i, .rx_n_i, .tx_man_o, .tx_en_o
   );
 
   asi_line_guard #(.ApfOnNs(ApfOnNs), .ApfOkNs(ApfOkNs)) u_guard (
     .clk_i, .rst_i, .tick_i(tick_us), .apf_ni, .efault_i, .apf_o(apf), .efault_o(efault)
   );
+
+  logic unused_monitor;                               // until asi_monitor is here
+  assign jabber   = 1'b0;
+  assign mon_head = mon_tail;
+  assign mon_lost = '0;
+  assign unused_monitor = mon_enable ^ mon_clear;
 
 `ifndef SYNTHESIS
   // readable telegrams in waveforms; without waves the simulator removes it

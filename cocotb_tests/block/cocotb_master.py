@@ -39,19 +39,23 @@ class MasterTB(TB):
                 first = now
                 self.trains.append([])
             self.trains[-1].append((now - first, 1 if int(self.dut.tx_man_o.value) else -1))
+            cocotb.start_soon(self._pulse(self.trains[-1][-1][1]))   # the chip hears itself
             if now - first == 78_000:
                 call = self.table.get(tuple(self.trains[-1]))
                 if call in self.answers:
                     cocotb.start_soon(self._answer(self.answers[call]))
 
+    async def _pulse(self, polarity):
+        pin = self.dut.rx_p_i if polarity > 0 else self.dut.rx_n_i
+        pin.value = 1
+        await Timer(1_500, "ns")
+        pin.value = 0
+
     async def _answer(self, data):
         at = 0
         for t, polarity in telegram.response_pulses(data):
             await Timer(t + 21_500 - at, "ns")
-            pin = self.dut.rx_p_i if polarity > 0 else self.dut.rx_n_i
-            pin.value = 1
-            await Timer(1_500, "ns")
-            pin.value = 0
+            await self._pulse(polarity)
             at = t + 23_000
 
     def calls(self):

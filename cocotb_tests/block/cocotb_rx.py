@@ -52,6 +52,19 @@ class Grid:
             return ErrorClass.LENGTH, None
         return ErrorClass.OK, sum(bits[2 * n] << (self.bits - 3 - n) for n in range(1, self.bits - 2))
 
+    def deviation(self, pulses):
+        """RX-015 -> (largest distance from the grid up to the end pulse, late); half way between two points is late."""
+        best = 0
+        for t, _ in pulses:
+            if t > self.decision:
+                break
+            offset = t % self.half
+            offset -= self.half if offset > self.half // 2 else 0
+            best = offset if abs(offset) > abs(best) else best
+            if self.window(t) == self.end:
+                break
+        return abs(best), int(best > 0)
+
 
 class TB:
     def __init__(self, dut):
@@ -60,7 +73,7 @@ class TB:
     async def start(self):
         await start(self.dut, n_start_i=0, p_start_i=0, en_i=1)
         self.first = watch(self.dut.first_o)
-        self.done = watch(self.dut.done_o, self.dut.class_o, self.dut.data_o)
+        self.done = watch(self.dut.done_o, self.dut.class_o, self.dut.data_o, self.dut.dev_o, self.dut.dev_late_o)
         return self
 
     async def pulses(self, pulses):
@@ -83,6 +96,7 @@ class TB:
         await until(max(now(), first + self.grid.decision + 2))
         assert self.first == [(first,)], f"first pulse: {self.first}, {pulses}"
         assert len(self.done) == 1 and self.done[0][0] == first + self.grid.decision, f"{self.done}, {first}, {pulses}"
+        assert self.done[0][3:] == self.grid.deviation(pulses), f"{self.done}, {self.grid.deviation(pulses)}, {pulses}"
         return ErrorClass(self.done[0][1]), self.done[0][2]
 
     async def expect(self, pulses, error, data=None):
@@ -148,6 +162,38 @@ async def drifting_grid(dut):
     late = tb.grid.late + 1
     shifted = [(t + (late if k > 3 else 0), p) for k, (t, p) in enumerate(pulses)]
     await tb.expect(shifted, ErrorClass.TIMING)
+
+
+@cocotb.test(timeout_time=20, timeout_unit="ms")
+async def deviation(dut):
+    """RX-015: each pulse in turn early and late by one clock, by the limit of its window and by one clock more; the
+    largest one counts, with its sign, and of two equal ones the first; no pulse after the end pulse does."""
+    tb = await TB(dut).start()
+    grid = tb.grid
+    pulses = grid.pulses(5)
+    seen = set()
+
+    async def expect(moves, deviation, late, *after):
+        moved = [(t + moves.get(k, 0), p) for k, (t, p) in enumerate(pulses)] + list(after)
+        assert grid.deviation(moved) == (deviation, late), (moves, grid.deviation(moved))
+        seen.add((await tb.receive(moved))[0])
+    await expect({}, 0, 0)
+    for k in range(1, len(pulses)):
+        for move in (1, grid.late, grid.late - 1):
+            await expect({k: move}, move, 1)
+        await expect({k: grid.late + 1}, grid.half - grid.late - 1, 0)  # nearer to the next grid point
+        for move in (1, grid.early - 1, grid.early, grid.early + 1):
+            await expect({k: -move}, move, 0)
+    assert seen == {ErrorClass.OK, ErrorClass.TIMING}
+    await expect({1: 2, 2: -3, 3: 1}, 3, 0)
+    await expect({1: -2, 2: 3, 3: -1}, 3, 1)
+    await expect({1: 2, 2: -2}, 2, 1)
+    await expect({1: -2, 2: 2}, 2, 0)
+    await expect({len(pulses) - 1: -1}, 1, 0, (grid.end * grid.half + grid.late, 1))
+    # without an end pulse every pulse counts, one in the last clock included
+    lost = [*pulses[:-1], (grid.decision, 1)]
+    assert grid.deviation(lost) == (grid.late, 1)
+    await tb.receive(lost)
 
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")

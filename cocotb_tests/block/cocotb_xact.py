@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One call on the line. The bench plays the slave: it drives pulses of 2 us on the comparator pins at given clocks.
+"""One call on the line. The bench plays the slave: it drives pulses of 1 us on the comparator pins at given clocks, and
+feeds the own transmission back when the block reads it (ReadBack). Tests of that: cocotb_xact_echo.py.
 
 Every test works on the pins: `edge` is the clock of the first edge of a request, `last` that of its last one, 78 us
 later.
@@ -24,6 +25,8 @@ class TB:
         self.levels = {1: 0, -1: 0}
         self.busy = 0
         self.enables = []  # (clock, level) of tx_en_o
+        self.read_back = bool(int(dut.ReadBack.value))
+        self.echo = 0 if self.read_back else None  # clocks from an own edge to its pulse on the pins, None: no echo
 
     def us(self, time):
         clocks = time * self.hz / 10**6
@@ -32,14 +35,24 @@ class TB:
 
     async def start(self, enable=1):
         dut = self.dut
-        await start(dut, enable_i=enable, req_valid_i=0, req_call_i=0, req_retries_i=0, req_no_reply_i=0,
-                    rx_p_i=0, rx_n_i=0)
+        await start(dut, enable_i=enable, req_valid_i=0, req_call_i=0, req_sel_i=0, req_retries_i=0,
+                    req_no_reply_i=0, rx_p_i=0, rx_n_i=0)
         self.started = now()
         self.results = watch(dut.res_valid_o, dut.res_last_o, dut.res_first_o, dut.res_data_o, dut.res_repeats_o)
         self.sent = watch(dut.sent_o, dut.repeat_o)
         cocotb.start_soon(self._requests())
+        self.attempts = watch(dut.att_valid_o, dut.att_index_o, dut.att_class_o, dut.att_repeat_o, dut.att_final_o,
+                              dut.att_delay_o, dut.att_dev_o, dut.att_dev_late_o)
         cocotb.start_soon(self._watch_enable())
+        cocotb.start_soon(self._echo())
         return self
+
+    async def _echo(self):
+        man = self.dut.tx_man_o
+        while True:
+            await ValueChange(man)
+            if self.echo is not None:
+                cocotb.start_soon(self.pulse(now() + self.echo, 1 if man.value else -1))
 
     async def _requests(self):
         """Offer what is queued, the next one in the clock after the one before was taken."""
@@ -47,8 +60,9 @@ class TB:
         while True:
             if self.queue.empty():
                 dut.req_valid_i.value = 0
-            call, retries, no_reply = await self.queue.get()
+            call, retries, no_reply, sel = await self.queue.get()
             dut.req_call_i.value, dut.req_retries_i.value, dut.req_no_reply_i.value = call, retries, no_reply
+            dut.req_sel_i.value = sel
             dut.req_valid_i.value = 1
             while True:
                 await RisingEdge(dut.sent_o)
@@ -63,8 +77,8 @@ class TB:
             await ValueChange(self.dut.tx_en_o)
             self.enables.append((now(), int(self.dut.tx_en_o.value)))
 
-    def offer(self, call=CALL, retries=0, no_reply=0):
-        self.queue.put_nowait((call, retries, no_reply))
+    def offer(self, call=CALL, retries=0, no_reply=0, sel=0):
+        self.queue.put_nowait((call, retries, no_reply, sel))
 
     async def request(self):
         """-> clock of the first edge of the next request, checked: tx_en leads by 0 to 12 us."""
@@ -229,14 +243,16 @@ async def late_answer(dut):
 
 @cocotb.test(timeout_time=20, timeout_unit="ms")
 async def early_pulse(dut):
-    """LT-002, RX-012: until 4.5 us after the own last pulse everything is our own echo; from there to one clock
-    before 12 us a pulse is EARLY."""
+    """LT-002, RX-012: until 4.5 us after the own last pulse everything is our own echo, with read-back until it was
+    judged (7.5 us after its last pulse); from there to one clock before 12 us a pulse is EARLY."""
     tb = TB(dut)
+    ours = ((1, OK), (tb.us(7.5) + 1, EARLY)) if tb.read_back else (
+        (1, OK), (tb.us(4.5), OK), (tb.us(4.5) + 1, EARLY))
     for _ in range(6):
         tb.offer()
     await tb.start()
     edge = await tb.request()
-    for delay, error in ((1, OK), (tb.us(4.5), OK), (tb.us(4.5) + 1, EARLY), (tb.us(12) - 1, EARLY)):
+    for delay, error in (*ours, (tb.us(12) - 1, EARLY)):
         last = edge + tb.us(78)
         await tb.pulse(last + delay, 1)
         if error == EARLY:
@@ -260,13 +276,8 @@ async def own_echo(dut):
     tb = TB(dut)
     for _ in range(3):
         tb.offer(telegram.encode_call("ADRA", 0, 7))  # E7, 26 pulses
+    tb.echo = tb.us(0.5)
     await tb.start()
-
-    async def echo():
-        while True:
-            await ValueChange(dut.tx_man_o)
-            await tb.pulse(now() + tb.us(0.5), 1 if dut.tx_man_o.value else -1)
-    cocotb.start_soon(echo())
     edge = await tb.request()
     last = await tb.good(edge, 6)
     following = await tb.request()
@@ -520,19 +531,20 @@ async def babble(dut):
 
     async def noise():
         while True:
-            await tb.pulse(now() + tb.us(5), 1)
+            await tb.pulse(now() + tb.us(4), 1)
     noise_task = cocotb.start_soon(noise())
     dut.enable_i.value = 1
     enabled = now()
     edge = await tb.request()
     assert tb.us(1000) - 1 <= edge - enabled <= tb.us(1000)
     repeat = await tb.request()
-    # the attempt ends as EARLY with the first pulse after the mask: at most 4.5 + 5 us after the last own pulse
+    # the attempt ends with the first pulse after the mask, or after the judgement of the own request
+    mask = 7.5 if tb.read_back else 4.5
     wait_time = repeat - edge - tb.us(78)
-    assert tb.us(1004.5) <= wait_time <= tb.us(1000 + 4.5 + 5 + 0.75) + 3, wait_time
+    assert tb.us(1000 + mask) <= wait_time <= tb.us(1000 + mask + 4 + 0.75) + 3, wait_time
     assert tb.results == []
     await wait(tb.us(100))
-    tb.result(EARLY, repeats=1)
+    tb.result(ErrorClass.BAD_MASTER if tb.read_back else EARLY, repeats=1)
     await wait(tb.us(2500))
     tb.offer()
     offered = now()

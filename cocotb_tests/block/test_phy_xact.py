@@ -11,5 +11,10 @@ def test_xact(mhz):
     run_cocotb("asi_xact", XACT, "cocotb_tests.block.cocotb_xact", parameters={"ClkHz": mhz * 10**6})
 
 
+def test_xact_no_read_back():
+    """RX-012, LT-002: the same without read-back, and without echo."""
+    run_cocotb("asi_xact", XACT, "cocotb_tests.block.cocotb_xact", parameters={"ClkHz": 8 * 10**6, "ReadBack": 0})
+
+
 def test_line_guard():
     run_cocotb("asi_line_guard", ["phy/asi_sync.sv", "phy/asi_line_guard.sv"], "cocotb_tests.block.cocotb_line_guard")

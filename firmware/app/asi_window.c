@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /** @file asi_window.c */
 #include "asi_window.h"
+#include "asi_diag.h"
 #include "asi_hal.h"
 #include "asi_hw.h"
 #include "hal_vexriscv.h"
 
 #define WIN(name) WINDOW(uint32_t, name)
 #define ALL_CONTROLS (HOST_CTRL_R__PROTECTED_MODE_bm | HOST_CTRL_R__OFFLINE_bm | HOST_CTRL_R__DATA_EXCHANGE_bm | \
-                      HOST_CTRL_R__AUTO_ADDRESS_ENABLE_bm)
+                      HOST_CTRL_R__AUTO_ADDRESS_ENABLE_bm | HOST_CTRL_R__MONITOR_bm)
 
 static asi_projection_t projections[2]; /* the core keeps the one in use; a commit fills the other */
 static unsigned in_use;
@@ -18,6 +19,7 @@ const asi_projection_t *asi_window_init(void)
     WIN(MAGIC)[0] = 0;
     for (unsigned w = 1; w < offsetof(asi_host_t, CDI) / 4u; w++)
         WIN(MAGIC)[w] = 0;
+    asi_diag_init();
     WIN(VERSION)[0] = ASI_VERSION;
     WIN(HOST_CTRL)[0] = HOST_CTRL_R__DATA_EXCHANGE_bm;
     for (unsigned i = 0; i < ASI_INDICES; i++) {
@@ -108,13 +110,16 @@ bool asi_window_serve(asi_ec_t *ec)
         status = asi_ec_set_projection(ec, p);
     if (status == ASI_OK) {
         in_use = next;
-        asi_ec_set_offline(ec, (controls & HOST_CTRL_R__OFFLINE_bm) != 0u);
+        /* ST-007: a monitor is silent */
+        asi_ec_set_offline(ec, (controls & (HOST_CTRL_R__OFFLINE_bm | HOST_CTRL_R__MONITOR_bm)) != 0u);
         asi_ec_set_mode(ec, (controls & HOST_CTRL_R__PROTECTED_MODE_bm) != 0u);
         asi_window_take_outputs(ec); /* data exchange may begin */
         asi_ec_set_data_exchange(ec, (controls & HOST_CTRL_R__DATA_EXCHANGE_bm) != 0u);
         asi_ec_set_auto_address(ec, (controls & HOST_CTRL_R__AUTO_ADDRESS_ENABLE_bm) != 0u);
         asi_window_publish(ec);
     }
+    if (status == ASI_OK)
+        asi_diag_commit((controls & HOST_CTRL_R__MONITOR_bm) != 0u);
     fw_seq = seq;
     WIN(FW_RESULT)[0] = (uint32_t)status;
     WIN(FW_SEQ)[0] = seq; /* last: the host waits for it */

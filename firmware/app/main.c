@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/** @file main.c  Line work in the interrupt; commits of the host in the main loop, which else sleeps. */
+/** @file main.c  Line work in the interrupt; commits of the host and diagnosis in the main loop, which else sleeps. */
+#include "asi_diag.h"
 #include "asi_hal.h"
 #include "asi_window.h"
 
@@ -56,6 +57,7 @@ int main(void)
     for (;;) {
         while (asi_window_serve(&ec)) {
         }
+        asi_diag_serve();
         hal_sleep();
     }
 }

@@ -44,6 +44,20 @@ uint16_t asi_call_command(asi_command_t command, unsigned index)
     return payload(CB, index, (unsigned)command ^ ((index & 32u) ? I3 : 0u));
 }
 
+unsigned asi_call_index(uint16_t call, bool extended)
+{
+    const unsigned number = (unsigned)call >> 5 & 31u;
+    const bool i3 = (call & I3) != 0u;
+    bool sel; /* CA-004: DEXG, WPAR, RES and RDST carry ~Sel, the other commands Sel */
+    if (number == 0u)
+        sel = false;
+    else if (!(call & CB))
+        sel = extended && !i3;
+    else
+        sel = (call & 0x14u) == 0x14u ? !i3 : i3;
+    return number + (sel ? 32u : 0u);
+}
+
 bool asi_call_is_legal(uint16_t call)
 {
     const unsigned number = (unsigned)call >> 5 & 31u;

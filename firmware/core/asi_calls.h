@@ -32,6 +32,8 @@ uint16_t asi_call_adra(unsigned number);
 uint16_t asi_call_wid1(unsigned id1);
 /** A command of the list above to one slave. */
 uint16_t asi_call_command(asi_command_t command, unsigned index);
+/** Index a call is meant for. extended: the number has A/B slaves, so I3 of DEXG and WPAR is ~Sel and not data. */
+unsigned asi_call_index(uint16_t call, bool extended);
 /** Whether a master may send this payload: one of the calls above, and not Enter_Program_Mode or a reserved code. */
 bool asi_call_is_legal(uint16_t call);
 #endif

@@ -154,7 +154,7 @@ static void leave_lds(asi_ec_t *ec, unsigned index)
 
 static void add_request(asi_ec_t *ec, unsigned index, uint16_t call)
 {
-    ec->requests[ec->batch_len] = (asi_request_t){.call = call, .retries = ASI_CMD_RETRY}; /* EX-010 */
+    ec->requests[ec->batch_len] = (asi_request_t){.call = call, .retries = ASI_CMD_RETRY, .sel = index >= 32u}; /* EX-010 */
     ec->request_index[ec->batch_len] = (uint8_t)index;
     ec->batch_len++;
 }
@@ -395,7 +395,7 @@ static void inclusion_request(asi_ec_t *ec, unsigned step)
 {
     static const uint8_t read[] = {ASI_CMD_RDIO, ASI_CMD_RDID, ASI_CMD_RID1, ASI_CMD_RID2};
     const unsigned i = ec->inclusion_index;
-    asi_request_t request = {.tag = ++ec->inclusion_tag};
+    asi_request_t request = {.tag = ++ec->inclusion_tag, .sel = i >= 32u};
     if (step != ec->inclusion_step)
         ec->inclusion_failures = 0;
     ec->inclusion_step = (uint8_t)step;
@@ -666,7 +666,10 @@ asi_status_t asi_ec_manage(asi_ec_t *ec, uint16_t call)
         return ASI_E_STATE;
     if (ec->management_open)
         return ASI_E_BUSY;
-    const asi_request_t request = {.call = call, .retries = ASI_CMD_RETRY, .tag = ++ec->management_tag}; /* EX-010 */
+    const unsigned number = (unsigned)call >> 5 & 31u;
+    const bool extended = is_extended(ec, number) || asi_list_has(&ec->state.lds, number + 32u);
+    const asi_request_t request = {.call = call, .retries = ASI_CMD_RETRY, .tag = ++ec->management_tag, /* EX-010 */
+                                   .sel = asi_call_index(call, extended) >= 32u};
     ec->management_open = true;
     ec->management_known = false;
     asi_port_management(&request);

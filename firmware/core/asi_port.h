@@ -17,6 +17,7 @@ typedef struct {
     uint8_t retries;  /**< immediate repetitions after a failure, 0..3 */
     uint8_t tag;      /**< management and inclusion: comes back with the result */
     bool no_reply;    /**< broadcast: no answer is expected */
+    bool sel;         /**< for a B slave: statistics are kept under its index (ST-001) */
 } asi_request_t;
 
 /** What came of it. */

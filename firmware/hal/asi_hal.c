@@ -7,6 +7,7 @@
 _Static_assert(HAL_CYCLE_DONE == ASI_REGS__EVENT__CYCLE_DONE_bm && HAL_BATCH_DONE == ASI_REGS__EVENT__BATCH_DONE_bm &&
                HAL_SLAVE_LOST == ASI_REGS__EVENT__SLAVE_LOST_bm && HAL_APF_CHANGE == ASI_REGS__EVENT__APF_CHANGE_bm &&
                HAL_TICK == ASI_REGS__EVENT__TICK_bm && HAL_HOST_ATTN == ASI_REGS__EVENT__HOST_ATTN_bm &&
+               HAL_EFAULT_CHANGE == ASI_REGS__EVENT__EFAULT_CHANGE_bm &&
                HAL_ALL_EVENTS == ASI_REGS__EVENT_EN__MASK_bm, "rdl/asi.rdl and asi_hal.h differ");
 
 static uint32_t ctrl;      /* CTRL as written */
@@ -17,7 +18,7 @@ static asi_result_t results[ASI_INDICES];
 static uint32_t request_word(const asi_request_t *request)
 {
     return request->call | (request->no_reply ? REQUEST_R__NO_REPLY_bm : 0u) |
-           (uint32_t)request->retries << REQUEST_R__RETRIES_bp | (uint32_t)request->tag << REQUEST_R__TAG_bp;
+           (request->sel ? REQUEST_R__SEL_bm : 0u) | (uint32_t)request->retries << REQUEST_R__RETRIES_bp | (uint32_t)request->tag << REQUEST_R__TAG_bp;
 }
 
 static asi_result_t result_of(uint32_t word)
@@ -198,6 +199,68 @@ hal_counters_t hal_counters(void)
 {
     return (hal_counters_t){.cycles = LINK(CYCLES)[0], .sent = LINK(SENT)[0], .repeated = LINK(REPEATED)[0],
                             .failed = LINK(FAILED)[0]};
+}
+
+static void read_stat(uint32_t base, unsigned index, uint32_t words[HAL_STAT_WORDS])
+{
+    const volatile uint32_t *from = (const volatile uint32_t *)(base + 4u * HAL_STAT_WORDS * index);
+    for (unsigned w = 0; w < HAL_STAT_WORDS; w++)
+        words[w] = from[w];
+}
+
+void hal_stat(unsigned index, uint32_t words[HAL_STAT_WORDS])
+{
+    read_stat(ASI_STATS_BASE, index, words);
+}
+
+void hal_stat_take(unsigned index, uint32_t words[HAL_STAT_WORDS])
+{
+    read_stat(ASI_STATS_CLEAR_BASE, index, words);
+}
+
+uint32_t hal_line_faults(void)
+{
+    const uint32_t status = REG(STATUS);
+    return (status & ASI_REGS__STATUS__APF_bm ? 1u : 0u) | (status & ASI_REGS__STATUS__EFAULT_bm ? 2u : 0u) |
+           REG(LATCH) << 8; /* jabber has no actual state: the guard lets go by itself */
+}
+
+void hal_forget_line_faults(void)
+{
+    REG(LATCH) = ASI_REGS__LATCH__APF_bm | ASI_REGS__LATCH__EFAULT_bm | ASI_REGS__LATCH__JABBER_bm;
+}
+
+static uint32_t monitor_tail;
+
+void hal_monitor(bool on)
+{
+    REG(MONITOR_CTRL) = 0;
+    REG(MONITOR_CTRL) = ASI_REGS__MONITOR_CTRL__CLEAR_bm;
+    monitor_tail = 0;
+    REG(MONITOR_CTRL) = on ? ASI_REGS__MONITOR_CTRL__ENABLE_bm : 0u;
+}
+
+bool hal_monitor_take(uint32_t words[2])
+{
+    const uint32_t head = (REG(MONITOR) & ASI_REGS__MONITOR__HEAD_bm) >> ASI_REGS__MONITOR__HEAD_bp;
+    const volatile uint32_t *record = (const volatile uint32_t *)(ASI_RING_BASE + 8u * monitor_tail);
+    if (head == monitor_tail)
+        return false;
+    words[0] = record[0];
+    words[1] = record[1];
+    monitor_tail = (monitor_tail + 1u) % ASI_RING_RECORDS;
+    REG(MONITOR_CTRL) = ASI_REGS__MONITOR_CTRL__ENABLE_bm | monitor_tail << ASI_REGS__MONITOR_CTRL__TAIL_bp;
+    return true;
+}
+
+uint32_t hal_monitor_lost(void)
+{
+    return (REG(MONITOR) & ASI_REGS__MONITOR__LOST_bm) >> ASI_REGS__MONITOR__LOST_bp;
+}
+
+uint32_t hal_clock_mhz(void)
+{
+    return REG(CLOCK) & ASI_REGS__CLOCK__MHZ_bm;
 }
 
 void hal_host_interrupt(void)

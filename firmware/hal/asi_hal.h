@@ -18,7 +18,8 @@ enum {
     HAL_APF_CHANGE = 1u << 3,
     HAL_TICK = 1u << 4,
     HAL_HOST_ATTN = 1u << 5,
-    HAL_ALL_EVENTS = 0x3Fu,
+    HAL_EFAULT_CHANGE = 1u << 6,
+    HAL_ALL_EVENTS = 0x7Fu,
 };
 
 typedef struct { uint32_t cycles, sent, repeated, failed; } hal_counters_t;
@@ -40,6 +41,23 @@ bool hal_apf(void);
 /** Bus time in us, wraps. */
 uint32_t hal_time_us(void);
 hal_counters_t hal_counters(void);
+enum { HAL_STAT_WORDS = 16 };
+/** Statistics of an index, words of stat_r in rdl/asi.rdl; each word is right, two of them may be an attempt apart. */
+void hal_stat(unsigned index, uint32_t words[HAL_STAT_WORDS]);
+/** The same, and every word is 0 afterwards; no count is lost (ST-004). */
+void hal_stat_take(unsigned index, uint32_t words[HAL_STAT_WORDS]);
+/** Line faults: bits 0..2 actual, 8..10 latched: APF, earth fault, jabber (LT-017). */
+uint32_t hal_line_faults(void);
+/** Forget the latched line faults; what is still there comes back at once. */
+void hal_forget_line_faults(void);
+/** Record all telegrams of the line, or stop. Starts with an empty ring. Main loop. */
+void hal_monitor(bool on);
+/** Oldest record of the ring, words of telegram_r in rdl/asi.rdl. Main loop. @return false: there is none */
+bool hal_monitor_take(uint32_t words[2]);
+/** Records that found the ring full since hal_monitor. */
+uint32_t hal_monitor_lost(void);
+/** Clocks per us: the unit of delays and deviations. */
+uint32_t hal_clock_mhz(void);
 /** Raise the host's interrupt. */
 void hal_host_interrupt(void);
 /** End of the interrupt: when the next cycle has ended already, it waits until the main loop has been round once, so

@@ -14,6 +14,10 @@
 #define ASI_WINDOW_BASE 0x40000000u
 #define ASI_REGS_BASE 0x80000000u
 #define ASI_LINK_BASE 0x80010000u
+#define ASI_STATS_BASE 0x80020000u
+#define ASI_STATS_CLEAR_BASE 0x80021000u /* a read here clears the word */
+#define ASI_RING_BASE 0x80030000u
+#define ASI_RING_RECORDS 256u
 
 #define REG(name) (*(volatile uint32_t *)(ASI_REGS_BASE + offsetof(asi_regs_t, name)))
 /** first word of an array or a single word of the link RAM */

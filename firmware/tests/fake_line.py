@@ -5,7 +5,7 @@ No time, no pulses: one call in, one answer or error class out. Calls are decode
 """
 import random
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from native import load
 
@@ -131,6 +131,9 @@ class Master:
         return result
 
     def run(self, request):
+        answering = [s for s in self.slaves if replace(s, heard=Counter()).answer(request.call) is not None]
+        for slave in answering:  # ST-001: the books are kept for the slave that answers
+            assert request.sel == slave.index >> 5, (hex(request.call), slave.index)
         for _ in range(request.retries + 1):
             error, data = self.attempt(request.call)
             if error in (OK, ABORTED):

@@ -14,7 +14,7 @@ static fw_request record(const asi_request_t *request)
 {
     if (request->call >= 0x800u || request->retries > 3u || request->no_reply)
         port.violations++;
-    return (fw_request){.call = request->call, .retries = request->retries, .tag = request->tag};
+    return (fw_request){.call = request->call, .retries = request->retries, .tag = request->tag, .sel = request->sel};
 }
 
 /* ---- asi_port.h */
@@ -205,6 +205,7 @@ int fw_call(const char *name, unsigned index, unsigned data, int extended)
     return -1;
 }
 
+unsigned fw_call_index(unsigned call, int extended) { return asi_call_index((uint16_t)call, extended != 0); }
 int fw_call_is_legal(unsigned call) { return asi_call_is_legal((uint16_t)call); }
 
 unsigned fw_list_next(const uint32_t list[2], unsigned from)

@@ -8,7 +8,7 @@
 #define FW_NATIVE_H
 #include <stdint.h>
 /* cffi begin */
-typedef struct { uint16_t call; uint8_t retries, tag; } fw_request;
+typedef struct { uint16_t call; uint8_t retries, tag, sel; } fw_request;
 typedef struct { uint8_t data, error, tag; } fw_result;
 
 typedef struct {
@@ -58,6 +58,7 @@ int fw_manage_result(fw_result *result);
 unsigned fw_ec_size(void);
 
 int fw_call(const char *name, unsigned index, unsigned data, int extended);  /* -1: no such call */
+unsigned fw_call_index(unsigned call, int extended);
 int fw_call_is_legal(unsigned call);
 unsigned fw_list_next(const uint32_t list[2], unsigned from);
 void fw_counters_write(void);  /* coverage counters to disk, now; nothing without gcov */

@@ -39,6 +39,16 @@ def test_commands():
     assert call("BR01") == encode_call("BR01")
 
 
+def test_index_of_a_call():
+    """ST-001, CA-004: the index a call is meant for, as the decoder of the host tools reads it."""
+    lib = load()[1]
+    for payload in range(0x800):
+        for extended in (False, True):
+            decoded = decode_call(payload, lambda number: extended)
+            if decoded.name not in ("BR01", "?") and lib.fw_call_is_legal(payload):
+                assert lib.fw_call_index(payload, extended) == decoded.index & (63 if payload & 0x3E0 else 31), hex(payload)
+
+
 def test_worked_words():
     """CA-003: the words printed in the specification notes, E1 .. E11 (14-bit request = payload, parity, end bit)."""
     def word(payload):

@@ -30,7 +30,12 @@ module asi_soc #(
   output logic [6:0]  batch_len_o,
   output logic [2:0]  exec_phase_o,
   input  logic        batch_busy_i, cycle_busy_i, apf_i, efault_i,
-  input  logic        cycle_done_i, batch_done_i, slave_lost_i,   // pulses
+  input  logic        cycle_done_i, batch_done_i, slave_lost_i, jabber_i,  // pulses
+  // monitor
+  output logic        mon_enable_o, mon_clear_o,      // clear: pulse
+  output logic [7:0]  mon_tail_o,
+  input  logic [7:0]  mon_head_i,
+  input  logic [15:0] mon_lost_i,
   output logic        core_wait_o                     // the core sleeps in WAIT
 );
   localparam logic [31:0] ResetVector = BootFromFlash ? 32'h1000_0000 : 32'h0000_0000;
@@ -106,16 +111,16 @@ module asi_soc #(
   // ---------------------------------------------------------------- time
   logic [UsW-1:0] us_cnt_q;
   logic [31:0]    time_q;
-  logic           apf_q;
+  logic           apf_q, efault_q;
   always_ff @(posedge clk_i) begin
     tick_us_o <= !rst_i && us_cnt_q == UsW'(UsClocks - 1);
     us_cnt_q  <= (rst_i || us_cnt_q == UsW'(UsClocks - 1)) ? '0 : us_cnt_q + 1'b1;
     time_q    <= rst_i ? '0 : time_q + 32'(tick_us_o);
-    apf_q     <= apf_i;                              // no event for the state that reset leaves
+    {apf_q, efault_q} <= {apf_i, efault_i};          // no event for the state that reset leaves
   end
 
   // ---------------------------------------------------------------- registers
-  logic [5:0]  pending;
+  logic [6:0]  pending;
   logic        regs_go, is_wait, spi_shift, spi_busy, rd_ack, wr_ack, rd_err, wr_err, stall_rd, stall_wr;
   logic [7:0]  spi_next;
 
@@ -126,8 +131,8 @@ module asi_soc #(
   assign irq         = pending != '0;
   // registered: what the core reads in WAIT does not hang on its own request in the same clock
   always_ff @(posedge clk_i)
-    pending <= {6{~rst_i}} & hw_out.EVENT_EN.mask.value &
-                       {hw_out.EVENT.host_attn.value, hw_out.EVENT.tick.value, hw_out.EVENT.apf_change.value,
+    pending <= {7{~rst_i}} & hw_out.EVENT_EN.mask.value &
+                       {hw_out.EVENT.efault_change.value, hw_out.EVENT.host_attn.value, hw_out.EVENT.tick.value, hw_out.EVENT.apf_change.value,
                         hw_out.EVENT.slave_lost.value, hw_out.EVENT.batch_done.value, hw_out.EVENT.cycle_done.value};
 
   always_comb begin
@@ -141,6 +146,13 @@ module asi_soc #(
     hw_in.EVENT.apf_change.hwset    = apf_i ^ apf_q;
     hw_in.EVENT.tick.hwset          = tick_us_o & (&time_q[9:0]);
     hw_in.EVENT.host_attn.hwset     = host_attn;
+    hw_in.EVENT.efault_change.hwset = efault_i ^ efault_q;
+    hw_in.LATCH.apf.hwset           = apf_i;
+    hw_in.LATCH.efault.hwset        = efault_i;
+    hw_in.LATCH.jabber.hwset        = jabber_i;
+    hw_in.MONITOR.head.next         = mon_head_i;
+    hw_in.MONITOR.lost.next         = mon_lost_i;
+    hw_in.CLOCK.mhz.next            = 8'(UsClocks);
     hw_in.TIME.us.next              = time_q;
     hw_in.WAIT.pending.next         = pending;
     hw_in.SPI_DATA.data.next        = spi_next;
@@ -166,6 +178,9 @@ module asi_soc #(
   assign line_en_o      = hw_out.CTRL.line_en.value;
   assign min_cycle_us_o = hw_out.CTRL.min_cycle_us.value;
   assign exec_phase_o   = hw_out.EXEC.phase.value;
+  assign mon_enable_o   = hw_out.MONITOR_CTRL.enable.value;
+  assign mon_clear_o    = hw_out.MONITOR_CTRL.clear.value;
+  assign mon_tail_o     = hw_out.MONITOR_CTRL.tail.value;
 
   // ---------------------------------------------------------------- flash
   asi_spi #(.ClkHz(ClkHz)) u_spi (

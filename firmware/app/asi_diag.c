@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/** @file asi_diag.c */
+#include "asi_diag.h"
+#include "asi_hal.h"
+#include "asi_hw.h"
+
+#define WIN(name) WINDOW(uint32_t, name)
+#define RING_RECORDS (sizeof(((asi_host_t *)0)->RING) / 8u)
+#define STAT_PERIOD_US 1024u
+#define TAKE_MAX 64u /* records in one call, so that commits are served in between */
+
+static bool monitoring, gap; /* gap: records were lost before the next one */
+static uint32_t head, dropped, last_us, stat_index;
+
+void asi_diag_init(void)
+{
+    for (unsigned w = (unsigned)(offsetof(asi_host_t, LINE_FAULTS) / 4u); w < sizeof(asi_host_t) / 4u; w++)
+        WIN(MAGIC)[w] = 0; /* MAGIC is word 0 of the window */
+    WIN(CLOCK_MHZ)[0] = hal_clock_mhz();
+}
+
+void asi_diag_commit(bool monitor)
+{
+    hal_forget_line_faults();
+    if (monitor == monitoring)
+        return;
+    monitoring = monitor;
+    hal_monitor(monitor);
+    if (monitor) {
+        head = 0;
+        dropped = 0;
+        gap = false;
+        WIN(RING_HEAD)[0] = 0;
+        WIN(RING_TAIL)[0] = 0;
+        WIN(RING_LOST)[0] = 0;
+    }
+}
+
+/** ST-008: a full ring loses the newest telegrams; the host moves RING_TAIL. */
+static void show_telegrams(void)
+{
+    uint32_t record[2];
+    for (unsigned k = 0; k < TAKE_MAX && hal_monitor_take(record); k++) {
+        const uint32_t next = (head + 1u) % RING_RECORDS;
+        if (next == WIN(RING_TAIL)[0] % RING_RECORDS) {
+            dropped++;
+            gap = true;
+            continue;
+        }
+        WIN(RING)[2u * head] = record[0];
+        WIN(RING)[2u * head + 1u] = record[1] | (gap ? RECORD_R__LOST_bm : 0u);
+        gap = false;
+        head = next;
+        WIN(RING_HEAD)[0] = head; /* last */
+    }
+    WIN(RING_LOST)[0] = dropped + hal_monitor_lost();
+}
+
+void asi_diag_serve(void)
+{
+    const uint32_t now = hal_time_us();
+    if (monitoring)
+        show_telegrams();
+    if (now - last_us < STAT_PERIOD_US)
+        return;
+    last_us = now;
+    WIN(LINE_FAULTS)[0] = hal_line_faults();
+    uint32_t words[HAL_STAT_WORDS];
+    hal_stat(stat_index, words);
+    for (unsigned w = 0; w < HAL_STAT_WORDS; w++)
+        WIN(STAT)[HAL_STAT_WORDS * stat_index + w] = words[w];
+    stat_index = (stat_index + 1u) % ASI_INDICES;
+}
