@@ -11,11 +11,13 @@ phy/asi_rx.sv
 phy/asi_xact.sv
 phy/asi_line_guard.sv
 link/asi_seq.sv
+link/asi_stats.sv
+link/asi_monitor.sv
 generated/asi_regs.sv
 dpm/asi_dpm.sv
 soc/asi_ram.sv
 soc/asi_boot_rom.sv
-soc/asi_link_mem.sv
+soc/asi_shared_mem.sv
 soc/asi_core.sv
 soc/asi_fabric.sv
 soc/asi_spi.sv

@@ -10,7 +10,7 @@ from cocotb_tests.cocotb_run import ROOT, run_cocotb
 
 VEXRISCV = Path(pythondata_cpu_vexriscv.data_location) / "VexRiscv_Min.v"
 SOURCES = ["generated/asi_regs_pkg.sv", "generated/asi_regs.sv", "soc/asi_core.sv", "soc/asi_ram.sv",
-           "soc/asi_boot_rom.sv", "soc/asi_link_mem.sv", "soc/asi_fabric.sv", "soc/asi_spi.sv", "dpm/asi_dpm.sv",
+           "soc/asi_boot_rom.sv", "soc/asi_shared_mem.sv", "soc/asi_fabric.sv", "soc/asi_spi.sv", "dpm/asi_dpm.sv",
            "soc/asi_soc.sv", VEXRISCV]
 
 
