@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Command line: `python -m asi run PLANT`, `python -m asi check PLANT ...` and `python -m asi decode FILE`.
+"""Command line: `python -m asi run PLANT`, `python -m asi check PLANT ...`,
+`python -m asi decode FILE` and `python -m asi replay FILE`.
 
 Exit codes: 0 everything as the plant expects, 1 an expectation was not met (decode: no telegram in the capture),
 2 bad input (plant, capture, option), 3 the simulation failed, 130 stopped by Ctrl-C (the report so far is written).
@@ -23,9 +24,11 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from asi import decode as decoding
+from asi import replay as replaying
 from asi import report
 from asi.bench import BenchError, name_waves, open_bench
 from asi.capture import ARM_V, UNITS, CaptureError, Info, Options
+from asi.native import NativeError
 from asi.plant import SETTLE_NS, Plant, PlantError, load_plant, parse_time
 from asi.run import Runner
 from asi.telegram_log import HEADER, to_line
@@ -35,6 +38,7 @@ EXIT_CODES = {"ok": OK, "expectation not met": NOT_MET, "failed": FAILED, "inter
 
 FIRMWARE = Path("build/firmware")
 QUICK_SETTLE_NS = 20_000_000  # P_PWR_SETTLE of asi_test.hex
+DIFFERENCES_SHOWN = 20
 SHORTEST_LOOK_NS = 100_000_000  # a run that ends this soon after the settle time shows little of the network
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
@@ -243,6 +247,31 @@ def _numbers(text: str) -> frozenset[int]:
     return frozenset(out)
 
 
+SignalP = Annotated[str | None, typer.Option("--p", metavar="SIGNAL", show_default=False,
+                                             help="Positive comparator pulses; with --n.")]
+SignalN = Annotated[str | None, typer.Option("--n", metavar="SIGNAL", show_default=False,
+                                             help="Negative comparator pulses; with --p.")]
+SignalMan = Annotated[list[str] | None, typer.Option(
+    "--man", metavar="SIGNAL", show_default=False, help="Manchester level, idle high; twice for a pair of which one is idle.")]
+SignalAnalog = Annotated[str | None, typer.Option("--analog", metavar="SIGNAL", show_default=False,
+                                                  help="Voltage of the line.")]
+Inverted = Annotated[bool, typer.Option("--invert", help="Wires swapped; Manchester level idle low.")]
+Columns = Annotated[str | None, typer.Option(metavar="NAME,...", show_default=False,
+                                             help="Column names of a CSV, instead of its header.")]
+TimeUnit = Annotated[str | None, typer.Option(
+    show_default=False, help="Time unit of a CSV: s, ms, us, ns; default: from the header, else s.")]
+Arm = Annotated[float, typer.Option(metavar="VOLT", help="Least amplitude of a first analog pulse.")]
+
+
+def _options(p: str | None, n: str | None, man: list[str] | None, analog: str | None, invert: bool,
+             columns: str | None, time_unit: str | None, arm: float) -> Options:
+    """The signals of a capture as the user said; a bad time unit ends the program."""
+    if time_unit is not None and time_unit not in UNITS:
+        raise _fail(f"--time-unit: '{time_unit}' is not one of {', '.join(UNITS)}", BAD_INPUT)
+    return Options(p, n, tuple(man or ()), analog, invert,
+                   tuple(c.strip() for c in columns.split(",")) if columns else (), time_unit, arm)
+
+
 @app.command()
 def decode(
     file: Annotated[Path, typer.Argument(help="Capture: VCD, FST, CSV or sigrok session (.sr).", show_default=False)],
@@ -251,21 +280,8 @@ def decode(
                                              help="Where to; default: the terminal.")] = None,
     stats: Annotated[Path | None, typer.Option(
         "--stats", show_default=False, help="Write the statistics as JSON as well.")] = None,
-    p: Annotated[str | None, typer.Option("--p", metavar="SIGNAL", show_default=False,
-                                          help="Positive comparator pulses; with --n.")] = None,
-    n: Annotated[str | None, typer.Option("--n", metavar="SIGNAL", show_default=False,
-                                          help="Negative comparator pulses; with --p.")] = None,
-    man: Annotated[list[str] | None, typer.Option(
-        "--man", metavar="SIGNAL", show_default=False,
-        help="Manchester level, idle high; twice for a pair of which one is idle.")] = None,
-    analog: Annotated[str | None, typer.Option("--analog", metavar="SIGNAL", show_default=False,
-                                               help="Voltage of the line.")] = None,
-    invert: Annotated[bool, typer.Option("--invert", help="Wires swapped; Manchester level idle low.")] = False,
-    columns: Annotated[str | None, typer.Option(
-        metavar="NAME,...", show_default=False, help="Column names of a CSV, instead of its header.")] = None,
-    time_unit: Annotated[str | None, typer.Option(
-        show_default=False, help="Time unit of a CSV: s, ms, us, ns; default: from the header, else s.")] = None,
-    arm: Annotated[float, typer.Option(metavar="VOLT", help="Least amplitude of a first analog pulse.")] = ARM_V,
+    p: SignalP = None, n: SignalN = None, man: SignalMan = None, analog: SignalAnalog = None, invert: Inverted = False,
+    columns: Columns = None, time_unit: TimeUnit = None, arm: Arm = ARM_V,
     ab: Annotated[frozenset[int] | None, typer.Option(
         parser=_numbers, metavar="NUMBERS", show_default=False,
         help="Numbers with A/B addressing, e.g. 5,7,20-31; the others have none. Default: learned.")] = None,
@@ -273,8 +289,6 @@ def decode(
         show_default=False, help="Take the numbers with A/B addressing from a plant file.")] = None,
 ) -> None:
     """Decode the telegrams in a capture of the line."""
-    if time_unit is not None and time_unit not in UNITS:
-        raise _fail(f"--time-unit: '{time_unit}' is not one of {', '.join(UNITS)}", BAD_INPUT)
     if plant is not None and ab is not None:
         raise _fail("--ab and --plant: one of them", BAD_INPUT)
     known: Callable[[int], bool | None] = lambda number: None  # noqa: E731
@@ -282,8 +296,7 @@ def decode(
         known = _load(plant).extended
     elif ab is not None:
         known = ab.__contains__
-    options = Options(p, n, tuple(man or ()), analog, invert, tuple(c.strip() for c in columns.split(",")) if columns
-                      else (), time_unit, arm)
+    options = _options(p, n, man, analog, invert, columns, time_unit, arm)
     info, code = Info(), OK
     with _output(out) as target:
         decoder = decoding.Decoder(_writer(form, target), decoding.Extended(known))
@@ -314,6 +327,49 @@ def decode(
         code = NOT_MET
         typer.echo(f"{file}: no telegram", err=True)
     raise typer.Exit(code)
+
+
+# ---------------------------------------------------------------- replay
+@app.command()
+def replay(
+    file: Annotated[Path, typer.Argument(help="Capture: VCD, FST, CSV or sigrok session (.sr).", show_default=False)],
+    p: SignalP = None, n: SignalN = None, man: SignalMan = None, analog: SignalAnalog = None, invert: Inverted = False,
+    columns: Columns = None, time_unit: TimeUnit = None, arm: Arm = ARM_V,
+    waves: Annotated[Path | None, typer.Option(
+        "--waves", show_default=False, help="Write the chip's waveform (FST where the machine can, else VCD).")] = None,
+    out: Annotated[Path | None, typer.Option(
+        "--out", "-o", show_default=False, help="Write the chip's records as JSON lines.")] = None,
+    firmware: Annotated[Path, typer.Option(help="Firmware image.")] = FIRMWARE / "asi_test.hex",
+) -> None:
+    """Feed a capture to the simulated chip, a passive monitor then, and compare what it saw with the decoder.
+
+    Exit codes: 0 they agree, 1 they differ or there is no telegram, 2 bad capture, 3 the simulation failed."""
+    options, info = _options(p, n, man, analog, invert, columns, time_unit, arm), Info()
+    try:
+        result = replaying.replay(file, firmware, options, waves, info)
+    except CaptureError as error:
+        raise _fail(str(error), BAD_INPUT) from None
+    except (replaying.ReplayError, NativeError) as error:
+        raise _fail(f"simulation: {error}", FAILED) from None
+    if out is not None:
+        try:
+            with open(out, "w", encoding="utf-8") as target:
+                for t_ns, record in result.records:
+                    target.write(json.dumps(replaying.to_record(t_ns, record), separators=(",", ":")) + "\n")
+        except OSError as error:
+            raise _fail(f"{out}: {error.strerror}", FAILED) from None
+    for difference in result.differences[:DIFFERENCES_SHOWN]:
+        typer.echo(f"{difference.t_ns / 1e3:.3f} us: decoder: {replaying.describe(difference.decoder)}; "
+                   f"chip: {replaying.describe(difference.chip)}")
+    if len(result.differences) > DIFFERENCES_SHOWN:
+        typer.echo(f"... {len(result.differences) - DIFFERENCES_SHOWN} more")
+    if result.lost:
+        typer.echo(f"{result.lost} telegrams found the ring full", err=True)
+    typer.echo(f"{file}: {info.format}, {info.kind}: the chip recorded {len(result.records)} telegrams; "
+               f"{result.calls} calls by the decoder, {len(result.differences)} differ")
+    if not result.calls:
+        raise _fail(f"{file}: no telegram", NOT_MET)
+    raise typer.Exit(NOT_MET if result.differences or result.lost else OK)
 
 
 def main() -> None:

@@ -64,6 +64,12 @@ def describe(call: Call | None) -> str:
     return f"request {call.word:03X}, {call.error_class.name}{answer}"
 
 
+def to_record(t_ns: float, record: RingRecord) -> dict[str, Any]:
+    """One telegram as the chip recorded it, for JSON lines (docs/decode.md)."""
+    return {"t_ns": round(t_ns), "request": record.request, "data": record.data, "class": record.error_class.name,
+            "deviation_ns": record.deviation_ns, "lost": record.lost}
+
+
 class _Feeder:
     """Pulses of the capture to the chip, silence cut; remembers how its time and the capture's belong together."""
 
