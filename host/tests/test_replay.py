@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""asi replay: captures against the chip as a passive monitor; and the host window's diagnosis on the running chip."""
+import random
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from test_decode import CALLS, TALK, TRAIN, conversation, csv_text, levels, man_levels, session, vcd, volts
+from typer.testing import CliRunner
+
+from asi import replay
+from asi.cli import app
+from asi.native import Chip
+from asi.regmap import ErrorClass
+from asi.telegram import encode_call, response_pulses
+from asi.window import HostWindow
+
+ROOT = Path(__file__).resolve().parents[2]
+FIRMWARE = ROOT / "build/firmware/asi_test.hex"
+MS = 1_000_000
+
+
+def write(tmp_path, content, name):
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def analog_csv(train, rate=8_000_000):
+    return "time_ns,v\n" + "".join(f"{k * 1e9 / rate:.1f},{v:.4f}\n" for k, v in enumerate(volts(train, rate)))
+
+
+@pytest.mark.parametrize("name, content", [
+    ("pulses.vcd", lambda: vcd(levels(TRAIN))), ("pulses.csv", lambda: csv_text(levels(TRAIN))),
+    ("man.csv", lambda: csv_text(man_levels(TRAIN), "time_ns,man")), ("volts.csv", lambda: analog_csv(TRAIN))])
+def test_all_kinds_of_captures(tmp_path, name, content):
+    """RP-001, ST-006, DE-001: pulses, Manchester level and voltage reach the receiver, which sees what the decoder sees."""
+    result = replay.replay(write(tmp_path, content(), name), FIRMWARE)
+    assert result.calls == len(TALK) and not result.differences and not result.lost
+    requests = [record for _, record in result.records if record.request]
+    assert [record.data for record in requests] == [call for call, _ in TALK]
+    assert [r.data for _, r in result.records if not r.request] == [a for _, a in TALK if a is not None]
+    first = result.records[0][0]
+    assert abs(first - TRAIN[0][0]) <= 250  # clock edge and stamp, 125 ns each
+
+
+def damaged(rng):
+    """One answer with a fault."""
+    train = response_pulses(rng.randrange(16))
+    k = rng.randrange(len(train))
+    kind = rng.randrange(5)
+    if kind == 0:
+        del train[k]
+    elif kind == 1:
+        train[k] = (train[k][0] + rng.choice((-2_000, -1_250, 750, 1_750, 2_250)), train[k][1])
+    elif kind == 2:
+        train[k] = (train[k][0], -train[k][1])
+    elif kind == 3:
+        train.append((rng.randrange(37_700, 43_000), rng.choice((-1, 1))))
+    else:
+        return train
+    return sorted(train)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_damaged_answers(tmp_path, seed):
+    """RP-001, ST-006, RX-001 .. RX-008: every class of answer is told alike by decoder and chip."""
+    rng = random.Random(seed)
+    talk = [(rng.choice(CALLS), damaged(rng)) for _ in range(150)]
+    result = replay.replay(write(tmp_path, csv_text(levels(conversation(*talk), width=1_000)), "x.csv"), FIRMWARE)
+    classes = Counter(record.error_class for _, record in result.records if not record.request)
+    assert result.calls == 150 and not result.differences and len(classes) >= 5
+
+
+def test_silence_is_cut(tmp_path):
+    """RP-002: a capture of 40 s with two conversations takes the bus time of the conversations; times stay the capture's."""
+    train = conversation(*TALK) + conversation(*TALK, start=40_000_000_000)
+    result = replay.replay(write(tmp_path, csv_text(levels(train)), "long.csv"), FIRMWARE)
+    assert result.calls == 2 * len(TALK) and not result.differences
+    assert abs(result.records[-1][0] - (train[-1][0] - 78_000)) <= 250
+
+
+def test_differences_are_told(tmp_path, monkeypatch):
+    """RP-001: what the two sides see differently is named with both views, exit code 1."""
+    path = write(tmp_path, csv_text(levels(TRAIN)), "x.csv")
+    taken = replay.calls_of_chip
+
+    def lying(records):
+        for k, call in enumerate(taken(records)):
+            if k == 0:
+                call.data ^= 1
+            if k != 2:
+                yield call
+    monkeypatch.setattr(replay, "calls_of_chip", lying)
+    out = CliRunner().invoke(app, ["replay", str(path), "--firmware", str(FIRMWARE)])
+    lines = out.stdout.splitlines()
+    assert out.exit_code == 1 and len(lines) == 3 and "100.000 us" in lines[0]
+    assert "decoder: request 4B0, OK answer 0001; chip: request 4B0, OK answer 0000" in lines[0]
+    assert "chip: nothing" in lines[1] and "2 differ" in lines[2]
+
+
+def test_command(tmp_path):
+    """RP-001, RP-002: exit codes, records as JSON lines, one line for a bad capture."""
+    path, records = write(tmp_path, session(bytes(100_000), 16_000_000), "none.sr"), tmp_path / "r.jsonl"
+    run = CliRunner().invoke
+    base = ["--firmware", str(FIRMWARE)]
+    assert run(app, ["replay", str(path), *base]).exit_code == 1
+    bad = run(app, ["replay", str(write(tmp_path, "nothing", "bad.csv")), *base])
+    assert bad.exit_code == 2 and len(bad.stderr.splitlines()) == 1
+    assert run(app, ["replay", str(path), "--firmware", str(tmp_path / "none.hex")]).exit_code == 3
+    good = run(app, ["replay", str(write(tmp_path, csv_text(levels(TRAIN)), "x.csv")), "--out", str(records), *base])
+    assert good.exit_code == 0 and len(records.read_text().splitlines()) == 2 * len(TALK) - 1
+
+
+# ---------------------------------------------------------------- diagnosis in the host window
+def start(*slaves, offline=False):
+    chip = Chip(FIRMWARE)
+    window = HostWindow(chip)
+    handles = [chip.net.add(index, io=7, id=0xA if index > 32 or index == 3 else 0xF) for index in slaves]
+    while not window.ready():
+        chip.run(chip.time_ns + MS // 10)
+    return chip, window, handles
+
+
+def test_counters_against_the_line_monitor():
+    """ST-001, ST-002, ST-009: what the chip counts per address is what the independent monitor of the line counts."""
+    chip, window, (_, _, _, faulty) = start(1, 3, 35, 5)
+    chip.run(100 * MS)
+    for fault in ({"p_parity": 20_000}, {"p_no_answer": 20_000}, {"p_missing_pulse": 20_000}, {"p_extra_pulse": 20_000},
+                  {"p_shifted_pulse": 20_000, "shift_ns": -1_250}, {"delay_ns": 4_000},
+                  {"p_shifted_pulse": 40_000, "shift_ns": 1_000}):
+        chip.net.set_faults(faulty, **fault)
+        chip.run(chip.time_ns + 40 * MS)
+    window.set_control(offline=True)
+    chip.run(chip.time_ns + 80 * MS)      # everything is copied once
+    log = chip.log()
+    sel = {call: index for index in range(64) if index != 32 for call in
+           [encode_call(name, index) for name in ("RDIO", "RDID", "RID1", "RID2", "RDST", "RES")]}
+    ab = {3, 35 & 31}
+
+    def index_of(t):
+        number = t.call >> 5 & 31
+        return sel[t.call] if t.call in sel else number + 32 * (number in ab and not t.call & 8)
+    seen, delays = {}, {}
+    for t in log[:-1]:                    # the last one is cut off by OFFLINE
+        index = index_of(t)
+        seen.setdefault(index, Counter())[ErrorClass(t.error_class)] += 1
+        if t.error_class == ErrorClass.OK:
+            delays.setdefault(index, []).append(t.delay_ns)
+    last = index_of(log[-1])
+    for index in (0, 1, 3, 35, 5, 7, 40):
+        found = window.statistics(index)
+        classes = dict(found.classes)
+        if index == last and classes != seen.get(index, {}):  # judged before OFFLINE came
+            classes[ErrorClass(log[-1].error_class)] -= 1
+        assert classes == dict(seen.get(index, {})), index
+        if index in delays:
+            assert found.delay_min_ns == min(delays[index]) and found.delay_max_ns == max(delays[index])
+            assert abs(found.delay_mean_ns - sum(delays[index]) / len(delays[index])) < 100
+    found = window.statistics(5)
+    assert found.repeat_ok > 10 and found.repeat_failed > 3 and found.deviation_ns == 1_000
+    assert {ErrorClass.NO_RESPONSE, ErrorClass.PARITY, ErrorClass.LENGTH, ErrorClass.TIMING} <= set(found.classes)
+
+
+def test_passive_monitor_is_silent():
+    """ST-007, ST-009: as a monitor the master sends nothing, and records what a foreign master says, until it is one again."""
+    chip, window, _ = start(1)
+    chip.run(80 * MS)
+    assert window.state().las == {1}
+    window.set_control(monitor=True)
+    chip.run(chip.time_ns + 5 * MS)
+    chip.log()
+    begin = chip.time_ns
+    for t, polarity in conversation((encode_call("RDIO", 7), 5), start=begin + MS):
+        chip.net.inject(t, polarity)
+    chip.run(begin + 20 * MS)
+    records = window.monitored()
+    assert [(r.request, r.data, r.error_class) for r in records] == [
+        (True, encode_call("RDIO", 7), ErrorClass.OK), (False, 5, ErrorClass.OK)]
+    assert not chip.log() and window.state().las == set()  # the log begins with requests of the own pins only
+    window.set_control(monitor=False)
+    chip.run(chip.time_ns + 80 * MS)
+    assert window.state().las == {1} and not window.monitored()
+
+
+def test_ring_overflow():
+    """ST-008, ST-009: a host that does not read keeps the oldest telegrams; the loss is counted and marked."""
+    chip, window, _ = start()
+    window.set_control(monitor=True)
+    chip.run(chip.time_ns + 5 * MS)
+    calls = [(encode_call("DEXG", 1 + k % 31, k % 16), k % 16) for k in range(300)]
+    for t, polarity in conversation(*calls, start=chip.time_ns + MS):
+        chip.net.inject(t, polarity)
+    chip.run(chip.time_ns + 60 * MS)
+    records = window.monitored()
+    assert len(records) == 511 and window.monitor_lost() == 600 - 511 and not any(r.lost for r in records)
+    assert [r.data for r in records if r.request] == [call for call, _ in calls[:256]]
+    for t, polarity in conversation((calls[0]), start=chip.time_ns + MS):
+        chip.net.inject(t, polarity)
+    chip.run(chip.time_ns + 5 * MS)
+    assert [r.lost for r in window.monitored()] == [True, False]
+
+
+def test_line_faults():
+    """LT-017, ST-009: a short power fail is seen as it is and stays latched until the next commit."""
+    chip, window, _ = start(1)
+    chip.run(60 * MS)
+    chip.apf(True)
+    chip.run(chip.time_ns + 5 * MS)
+    assert window.line_faults()["apf"] == (True, True)
+    chip.apf(False)
+    chip.run(chip.time_ns + 15 * MS)
+    assert window.line_faults()["apf"] == (False, True)
+    window.set_control()
+    chip.run(chip.time_ns + 5 * MS)
+    assert window.line_faults() == {"apf": (False, False), "efault": (False, False), "jabber": (False, False)}
