@@ -318,7 +318,7 @@ async def measured(dut):
 
 @cocotb.test(timeout_time=20, timeout_unit="ms")
 async def strobes(dut):
-    """RX-009, ST-006: pulse_n_o and pulse_p_o show each accepted pulse of either comparator, whoever sends it, 750 ns and
+    """RX-009: pulse_n_o and pulse_p_o show each accepted pulse of either comparator, whoever sends it, 750 ns and
     two clocks after its start."""
     tb = EchoTB(dut)
     await tb.start()
