@@ -11,6 +11,12 @@ def test_xact(mhz):
     run_cocotb("asi_xact", XACT, "cocotb_tests.block.cocotb_xact", parameters={"ClkHz": mhz * 10**6})
 
 
+@pytest.mark.parametrize("mhz", [8, 16])
+def test_xact_echo(mhz):
+    """RX-014, RX-015, ST-001 .. ST-003: read-back, and the report of each attempt."""
+    run_cocotb("asi_xact", XACT, "cocotb_tests.block.cocotb_xact_echo", parameters={"ClkHz": mhz * 10**6})
+
+
 def test_xact_no_read_back():
     """RX-012, LT-002: the same without read-back, and without echo."""
     run_cocotb("asi_xact", XACT, "cocotb_tests.block.cocotb_xact", parameters={"ClkHz": 8 * 10**6, "ReadBack": 0})
