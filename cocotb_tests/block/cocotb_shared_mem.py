@@ -43,7 +43,8 @@ class TB:
         core, eng = self.core or Access(), self.eng or Access()
         self.dut.core_req_i.value = self.core is not None
         self.dut.core_we_i.value, self.dut.core_clear_i.value = core.we, core.clear
-        self.dut.core_be_i.value, self.dut.core_addr_i.value, self.dut.core_wdata_i.value = core.be, core.addr, core.wdata
+        self.dut.core_be_i.value = core.be
+        self.dut.core_addr_i.value, self.dut.core_wdata_i.value = core.addr, core.wdata
         self.dut.eng_req_i.value = self.eng is not None
         self.dut.eng_we_i.value, self.dut.eng_addr_i.value, self.dut.eng_wdata_i.value = eng.we, eng.addr, eng.wdata
 

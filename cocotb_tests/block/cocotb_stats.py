@@ -109,7 +109,8 @@ class TB:
     async def check(self, words=range(1024)):
         for word in words:
             got = await self.core.read(word)
-            assert got == self.model.words[word], f"word {word % 16} of {word // 16}: {got:#x}, not {self.model.words[word]:#x}"
+            want = self.model.words[word]
+            assert got == want, f"word {word % 16} of index {word // 16}: {got:#x}, not {want:#x}"
 
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
