@@ -5,15 +5,16 @@
 //   Answer or request: the first telegram between P_RX_OPEN and P_RX_TIMEOUT after a good request is its answer. Any
 //   other is a request when a pulse comes between 37.5 and 43.5 us, else an answer that stands alone.
 //   EARLY: a telegram that begins before P_RX_OPEN after a good request; recorded as an answer.
-//   Pause: P_PAUSE (7.5 us) after a good request or the good answer to it. After all else, and when it begins to listen,
-//   BadPauseNs (18 us, longer than the hole that missing pulses of one bit leave), restarted by every pulse; such
-//   a hole ends the telegram in which it is, unless that is an answer, whose 43.5 us are always waited for.
+//   Pause: P_PAUSE (7.5 us) after a good request or the good answer to it. After all else, and when it begins to
+//   listen, BadPauseNs (18 us, longer than the hole that missing pulses of one bit leave), restarted by every pulse;
+//   such a hole ends the telegram in which it is, unless that is an answer, whose 43.5 us are always waited for.
 // Data and deviation are those of the 14-bit receiver, which has seen what the 7-bit one has; only the class differs.
-// Of a telegram with a failed check, data are the bits that came. A telegram on the line when enable_i falls or
-// clear_i comes has no record and is not counted as lost. The ring holds 255 records: head = tail is empty.
+// Of a telegram with a failed check, data are the bits that came. A telegram on the line when enable_i falls or clear_i
+// comes has no record and is not counted as lost. The ring holds 255 records: head = tail is empty.
 // Against the Python library (asi.monitor, one record per call), on the same pulses:
-//   - a good request, then a pulse within 7.5 us: here the request has LENGTH, there the call is EARLY; when the pulse
-//     is between the decision (85.5 us) and the end of the pause it has no record here, there the call is EARLY;
+//   - a good request, then a pulse before 85.5 us from its start: here the request has LENGTH, there the call is EARLY;
+//     a later pulse that is still inside the 7.5 us of the pause has no record here;
+//   - a pulse between the decision on a good answer and the end of the pause: no record here, a request there;
 //   - a bad telegram without a good request before it is always a bad request there; here it is an answer if no
 //     pulse comes between 37.5 and 43.5 us, and its class may name a check of 7 bits instead of NO_INFORMATION;
 //   - no answer has no record here.
@@ -74,7 +75,7 @@ module asi_monitor
   logic [RingW-1:0]  head_d, head_q;
   logic [15:0]       lost_d, lost_q;
   logic              mark_d, mark_q;       // the next record is marked: some before it were lost
-  logic              pulse, paused, hole, listen, full, record, is_request;
+  logic              pulse, paused, hole, listen, full, record, is_request, decided7;
   logic              done7, done14, late7, late;
   error_class_e      class7, class14, error;
   logic [3:0]        data7;
@@ -83,52 +84,53 @@ module asi_monitor
   /* verilator lint_off PINCONNECTEMPTY */  // first_o: the pulse itself says it
   asi_rx #(.ClkHz(ClkHz), .Bits(7), .HalfBitNs(HalfBitNs), .WinEarlyNs(WinEarlyNs), .WinLateNs(WinLateNs),
            .RxQuietNs(RxQuietNs)) u_rx7 (
-    .clk_i, .rst_i, .n_start_i, .p_start_i, .en_i(listen), .first_o(), .done_o(done7), .class_o(class7),
-    .data_o(data7), .dev_o(dev7), .dev_late_o(late7)
+    .clk_i, .rst_i, .n_start_i, .p_start_i, .en_i(listen && state_q != StRequest), .first_o(), .done_o(done7),
+    .class_o(class7), .data_o(data7), .dev_o(dev7), .dev_late_o(late7)
   );
   asi_rx #(.ClkHz(ClkHz), .Bits(14), .HalfBitNs(HalfBitNs), .WinEarlyNs(WinEarlyNs), .WinLateNs(WinLateNs),
            .RxQuietNs(RxQuietNs)) u_rx14 (
-    .clk_i, .rst_i, .n_start_i, .p_start_i, .en_i(listen), .first_o(), .done_o(done14), .class_o(class14),
-    .data_o(data), .dev_o(dev), .dev_late_o(late)
+    .clk_i, .rst_i, .n_start_i, .p_start_i, .en_i(listen && !decided7), .first_o(), .done_o(done14),
+    .class_o(class14), .data_o(data), .dev_o(dev), .dev_late_o(late)
   );
   /* verilator lint_on PINCONNECTEMPTY */
 
-  // "will be over in the next clock, unless a pulse comes now": so a pulse right at the end of a pause belongs to the next
+  // "will be over in the next clock, unless a pulse comes now": a pulse right at the end of a pause is after it
   assign pulse  = n_start_i || p_start_i;
-  assign paused = !pulse && quiet_q >= (bad_q ? QuietW'(BadPause - 1) : QuietW'(Pause - 1));
+  assign paused = !pulse && quiet_q >= (bad_d ? QuietW'(BadPause - 1) : QuietW'(Pause - 1));
   assign hole   = !pulse && quiet_q >= QuietW'(BadPause - 1);
   assign listen = state_q != StSync && !(hole && state_q != StIdle && !answer_q);
+  // the end of an answer; what begins later than an answer may end says that this is a request
+  assign decided7 = state_q == StTelegram && done7 && (!long_d || answer_q || early_q);
   assign full   = head_q + 1'b1 == tail_i;
 
   always_comb begin
     state_d  = state_q;   bad_d   = bad_q;    asked_d = asked_q;
-    answer_d = answer_q;  early_d = early_q;  long_d  = long_q;
+    answer_d = answer_q;  early_d = early_q;
     record   = 1'b0;      is_request = 1'b0;  error   = class14;
     quiet_d  = pulse ? QuietW'(1) : quiet_q + QuietW'(quiet_q <= QuietW'(RxTimeout));
+    long_d   = state_q == StTelegram && (long_q || (pulse && age_q > AgeW'(AnswerEnd)));
     age_d    = age_q + AgeW'(age_q <= AgeW'(AnswerEnd));
     unique case (state_q)
       // StSync: waits for a pause
       StSync: begin
-        if (pulse)  bad_d   = 1'b1;
-        if (pulse)  asked_d = 1'b0;
-        if (paused) state_d = StIdle;
+        if (pulse) bad_d   = 1'b1;
+        if (pulse) asked_d = 1'b0;
       end
       // StIdle: the next pulse is the first of a telegram
       StIdle: if (pulse) begin
         state_d  = StTelegram;
         age_d    = AgeW'(1);
-        long_d   = 1'b0;
         early_d  = asked_q && quiet_q < QuietW'(RxOpen);
         answer_d = asked_q && quiet_q >= QuietW'(RxOpen) && quiet_q <= QuietW'(RxTimeout);
         asked_d  = 1'b0;
       end
       // StTelegram: the first 43.5 us
       StTelegram: begin
-        if (pulse && age_q > AgeW'(AnswerEnd)) long_d = 1'b1;
-        if (done7) begin
+        if (done7) state_d = StRequest;
+        if (decided7) begin
           error   = early_q ? ErrEarly : class7;
-          record  = !long_d || answer_q || early_q;
-          state_d = record ? StSync : StRequest;
+          record  = 1'b1;
+          state_d = StSync;
           bad_d   = class7 != ErrOk || !answer_q;
         end
       end
@@ -150,6 +152,7 @@ module asi_monitor
       error   = early_q ? ErrEarly : class14;
       state_d = StIdle;
     end
+    if (state_d == StSync && paused) state_d = StIdle;
     if (!enable_i || clear_i) begin
       state_d = StSync;  bad_d = 1'b1;  asked_d = 1'b0;  record = 1'b0;
     end
@@ -172,7 +175,7 @@ module asi_monitor
     mem_wdata_o = time_q;
     if (record) begin
       mem_wdata_o = '0;
-      mem_wdata_o[RecordDataLsb +: RecordDataW]           = data;
+      mem_wdata_o[RecordDataLsb +: RecordDataW]           = {data[10:4] & {7{is_request}}, data[3:0]};
       mem_wdata_o[RecordRequestLsb]                       = is_request;
       mem_wdata_o[RecordErrorLsb +: RecordErrorW]         = error;
       mem_wdata_o[RecordDeviationLsb +: RecordDeviationW] = dev;
@@ -207,7 +210,7 @@ module asi_monitor
     Hole_A:    assert (state_q == StSync || listen || class14 != ErrOk);
     OneWord_A: assert (!record || !(state_q == StIdle && pulse));
     Open_A:    assert (!record || state_q == StTelegram || state_q == StRequest);
-    Same_A:    assert (!done7 || class7 != ErrOk || long_q || {data, dev, late} == {7'd0, data7, dev7, late7});
+    Same_A:    assert (!done7 || class7 != ErrOk || long_q || {data[3:0], dev, late} == {data7, dev7, late7});
     Either_A:  assert (!(answer_q && early_q) || state_q == StSync || state_q == StIdle);
     Answer_C:  cover (record && answer_q && error == ErrOk);
     Request_C: cover (record && is_request && error == ErrOk);

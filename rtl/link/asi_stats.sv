@@ -41,7 +41,8 @@ module asi_stats
   logic        is_delay, is_sum, is_dev, low_is_new, high_is_new, carry;
   logic [15:0] low_new, low, high;       // write data
 
-  // A word is read + new, or new alone. What must stay is read + 0. All words are 0 in StClear: delay_q is 0 then.
+  // A word is read + new, or new alone. What must stay is read + 0. In StClear both parts are new, from registers that
+  // reset has set to 0.
   assign is_delay    = word_q == WordDelay;
   assign is_sum      = word_q == WordSum;
   assign is_dev      = word_q == WordDev;
@@ -104,8 +105,8 @@ module asi_stats
     state_q <= rst_i ? StClear : state_d;
     {index_q, word_q} <= rst_i ? '0 : {index_d, word_d};
     delay_q <= rst_i ? '0 : delay_d;
+    dev_q   <= rst_i ? '0 : dev_d;
     repeated_q <= repeated_d;
-    dev_q   <= dev_d;
     min_q   <= mem_rdata_i[15:0] == '0 || mem_rdata_i[15:0] > delay_q;
     max_q   <= mem_rdata_i[31:16] < delay_q;
     far_q   <= mem_rdata_i[7:0] < dev_q[7:0];
