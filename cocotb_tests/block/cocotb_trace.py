@@ -3,9 +3,8 @@ import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge
 
-from asi.plant import address_name
 from asi.regmap import ErrorClass, Phase
-from asi.telegram import decode_call, encode_call
+from asi.telegram import address_name, decode_call, encode_call
 
 
 def text(signal):
