@@ -28,9 +28,10 @@ class Signal(NamedTuple):
     form: str = BINARY
     label: str = ""
 
-    def gtkwave(self) -> str:
-        path = re.sub(r"(\w+)(\[\d+\])$", r"\1.\1\2", self.path)    # Verilator makes the array a scope of its own
-        return (f"+{{{self.label}}} " if self.label else "") + f"{TOP}.{path}{self.bits}"
+    def gtkwave(self) -> list[str]:
+        """One line, two for an array: in FST it is a scope of its own, in VCD not; GTKWave skips what is not there."""
+        paths = dict.fromkeys((re.sub(r"(\w+)(\[\d+\])$", r"\1.\1\2", self.path), self.path))
+        return [(f"+{{{self.label}}} " if self.label else "") + f"{TOP}.{path}{self.bits}" for path in paths]
 
     def surfer(self) -> str:
         return f"{TOP}." + re.sub(r"(\[\d+\])$", r".\1", self.path)
@@ -70,7 +71,8 @@ def gtkwave() -> str:
     for group in VIEW:
         out += [f"@{'c00200' if group.closed else '800200'}", f"-{group.name}"]
         for signal in group.signals:
-            out += [f"@{GTKW_FLAGS[signal.form]}", signal.gtkwave()]
+            for line in signal.gtkwave():
+                out += [f"@{GTKW_FLAGS[signal.form]}", line]
         out += [f"@{'1401200' if group.closed else '1000200'}", f"-{group.name}"]
     return "\n".join(out) + "\n"
 
