@@ -116,6 +116,7 @@ module asi_trace
       ErrParity:        return "PARITY        ";
       ErrLength:        return "LENGTH        ";
       ErrEarly:         return "EARLY         ";
+      ErrBadMaster:     return "BAD_MASTER    ";
       ErrAborted:       return "ABORTED       ";
       default:          return "?             ";
     endcase
