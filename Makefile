@@ -102,14 +102,21 @@ run: $(VENV)/.ready $(RUN_LIB) $(BUILD)/firmware/asi.hex $(BUILD)/firmware/asi_t
 check: $(VENV)/.ready  ## check a plant file without running it: make check PLANT=...
 	@$(VPY) -m asi check "$(PLANT)"
 
-# ---------------------------------------------------------------- requirement matrix, waveform view
+# ---------------------------------------------------------------- requirement matrix, waveform views, sigrok
 .PHONY: matrix
 matrix: $(VENV)/.ready  ## docs/verification.md: which tests name which requirement, and the gaps
 	@$(VPY) tools/matrix.py
 
 .PHONY: views
-views: $(VENV)/.ready  ## regenerate sim/views/asi.gtkw
-	@$(VPY) tools/gtkw.py
+views: $(VENV)/.ready  ## regenerate sim/views: GTKWave, Surfer
+	@$(VPY) tools/views.py
+
+.PHONY: sigrok sigrok-session
+sigrok:  ## build/sigrok: the AS-i decoder for PulseView and sigrok-cli (host/sigrok/README.md)
+	@$(PYTHON) tools/sigrok.py install
+
+sigrok-session: $(VENV)/.ready  ## build/run/line.sr for PulseView from build/run/waves.fst (make run WAVES=1 first)
+	@$(VPY) tools/sigrok.py session $(BUILD)/run/waves.$(TB_WAVE) $(BUILD)/run/line.sr
 
 # ---------------------------------------------------------------- figures
 .PHONY: figures

@@ -165,7 +165,7 @@ module asi_master #(
   asi_trace u_trace (
     .clk_i, .rst_i, .req_i(req_valid & req_ready), .req_call_i(req_call), .res_i(res_valid), .res_class_i(res_last),
     .res_data_i(res_data), .phase_i(asi_map_pkg::phase_e'(phase_o)),
-    .request_text_o(), .answer_text_o(), .phase_text_o(), .outputs_o(), .inputs_o()
+    .request_text_o(), .answer_text_o(), .phase_text_o()
   );
 
   initial begin

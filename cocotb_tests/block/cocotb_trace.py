@@ -3,13 +3,12 @@ import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge
 
-from asi.plant import address_name
 from asi.regmap import ErrorClass, Phase
-from asi.telegram import decode_call, encode_call
+from asi.telegram import address_name, decode_call, encode_call
 
 
-def text(signal):
-    return int(signal.value).to_bytes(14, "big").decode("ascii").rstrip()
+def text(signal, letters=14):
+    return int(signal.value).to_bytes(letters, "big").decode("ascii").rstrip()
 
 
 def expected(call, extended):
@@ -84,22 +83,29 @@ async def answers_and_phases_read_right(dut):
 
 @cocotb.test(timeout_time=1, timeout_unit="ms")
 async def last_data_per_slave(dut):
-    """PL-003: a nibble per index holds the last DEXG data and the last valid DEXG answer, and nothing else moves it."""
+    """PL-003: a text per slave: the last DEXG data, the last valid answer, '!' when there was none; DEXG only."""
     await start(dut)
+    texts = {index: "" for index in range(64) if index & 31}
+
+    def check():
+        for index, wanted in texts.items():
+            array = dut.last_b if index & 32 else dut.last_a
+            assert text(array[index & 31], 12) == wanted, index
+
+    check()
     await request(dut, encode_call("RDID", 7))
     await result(dut, ErrorClass.OK, 0xA)
-    story = (("DEXG", 3, 0b1010, ErrorClass.OK, 0b0110), ("DEXG", 7 + 32, 0b101, ErrorClass.OK, 0b1001),
-             ("DEXG", 7, 0b011, ErrorClass.OK, 0b0011), ("DEXG", 3, 0b0001, ErrorClass.PARITY, 0b1111),
-             ("WPAR", 3, 0b0111, ErrorClass.OK, 0b0111))
-    outputs, inputs = [15] * 64, [0] * 64
-    for name, index, data, error, answer in story:
-        call = encode_call(name, index, data, extended=index & 31 == 7)
-        await request(dut, call)
+    story = (("DEXG", 3, 0b1010, ErrorClass.OK, 0b0110, "1010 -> 0110"),
+             ("DEXG", 7 + 32, 0b101, ErrorClass.OK, 0b1001, "101  -> 1001"),
+             ("DEXG", 7, 0b011, ErrorClass.OK, 0b0011, "011  -> 0011"),
+             ("DEXG", 3, 0b0001, ErrorClass.PARITY, 0b1111, "0001 !> 0110"),
+             ("WPAR", 3, 0b0111, ErrorClass.OK, 0b0111, "0001 !> 0110"),
+             ("DEXG", 31, 0b1111, ErrorClass.NO_RESPONSE, 0, "1111 !>"),
+             ("DEXG", 7 + 32, 0b000, ErrorClass.LENGTH, 0, "000  !> 1001"),
+             ("DEXG", 3, 0b0001, ErrorClass.OK, 0b0000, "0001 -> 0000"))
+    for name, index, data, error, answer, wanted in story:
+        await request(dut, encode_call(name, index, data, extended=index & 31 == 7))
+        check()                 # it changes with the answer, not before
         await result(dut, error, answer)
-        if name == "DEXG":
-            outputs[index] = call & 15
-            if error == ErrorClass.OK:
-                inputs[index] = answer
-        for signal, nibbles in ((dut.outputs_o, outputs), (dut.inputs_o, inputs)):
-            value = int(signal.value)
-            assert [value >> 4 * index & 15 for index in range(64)] == nibbles
+        texts[index] = wanted
+        check()

@@ -35,7 +35,8 @@ def test_lint():
     assert "%Warning" not in output
 
 
-@pytest.mark.parametrize("page", sorted(p.relative_to(ROOT).as_posix() for p in [ROOT / "README.md", *ROOT.glob("docs/*.md")]))
+@pytest.mark.parametrize("page", sorted(p.relative_to(ROOT).as_posix() for p in [
+    ROOT / "README.md", ROOT / "host/sigrok/README.md", *ROOT.glob("docs/*.md")]))
 def test_links_lead_somewhere(page):
     """PL-002: every file that a page links or names as `path/file` exists; every `make target` exists."""
     text = (ROOT / page).read_text()

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // asi_trace: readable text for waveforms: what is asked, what is answered, in which phase. Simulation only (PL-003).
-// Show the *_text_o signals as ASCII, the nibble signals as hexadecimal: digit n from the right belongs to index n.
-// Texts are left-justified with spaces. It learns from RDID answers which numbers use A/B addressing.
+// Show every text as ASCII; texts are left-justified with spaces. last_a, last_b: the last data of each slave, element
+// = number, blank until its first DEXG. It learns from RDID answers which numbers use A/B addressing.
 `ifndef SYNTHESIS
 module asi_trace
   import asi_map_pkg::*;
 #(
-  localparam int unsigned Chars = 14  // of every text
+  localparam int unsigned Chars = 14  // of the three texts
 ) (
   input  logic                clk_i, rst_i,
   input  logic                req_i,          // one clock: asi_xact takes a call
@@ -17,10 +17,13 @@ module asi_trace
   input  phase_e              phase_i,
   output logic [8*Chars-1:0]  request_text_o, // "DEXG 17B 101", the last call taken
   output logic [8*Chars-1:0]  answer_text_o,  // "0110" or the error class; stays until the next result, to be readable
-  output logic [8*Chars-1:0]  phase_text_o,
-  output logic [63:0][3:0]    outputs_o,      // last DEXG data per slave, line level
-  output logic [63:0][3:0]    inputs_o        // last valid DEXG answer per slave
+  output logic [8*Chars-1:0]  phase_text_o
 );
+  typedef logic [8*12-1:0] slave_text_t;  // "1010 -> 0111"; "1010 !> 0111": the last answer was none or bad
+  // two arrays of 32, because a simulator may leave larger ones out of the waves. Written one element at a time and
+  // not through a next-state signal: copying and comparing them all would slow a traced run down.
+  slave_text_t last_a [32];   // standard and A slaves
+  slave_text_t last_b [32];   // B slaves
   typedef logic [8*Chars-1:0] text_t;
   typedef struct packed {
     logic [31:0] name;       // four letters
@@ -35,7 +38,8 @@ module asi_trace
   logic [31:0] ext_d, ext_q;  // this number uses A/B addressing
   decoded_t    call_d, call_q;
   text_t       request_d, answer_d;
-  logic [63:0][3:0] outputs_d, inputs_d;
+  logic [31:0] old_input;     // four letters: the last valid answer of the slave that is called
+  slave_text_t slave_text;
 
   function automatic logic [7:0] digit(logic [3:0] value);
     return 8'h30 + 8'(value);
@@ -135,22 +139,22 @@ module asi_trace
     call_d    = call_q;
     request_d = request_text_o;
     answer_d  = answer_text_o;
-    outputs_d = outputs_o;
-    inputs_d  = inputs_o;
     if (res_i) begin
       answer_d = class_text(res_class_i);
       if (res_class_i == ErrOk) begin
         answer_d = call_q.no_answer ? "none          " : {bits_text({1'b0, res_data_i}, 3'd4), "         "};
         if (call_q.is_rdid) ext_d[call_q.index[4:0]] = res_data_i == 4'hA;
-        if (call_q.is_dexg) inputs_d[call_q.index] = res_data_i;
       end
     end
     if (req_i) begin
       call_d    = decode(req_call_i, ext_d);
       request_d = {call_d.name, " ", call_d.address, " ", call_d.data};
-      if (call_d.is_dexg) outputs_d[call_d.index] = req_call_i[3:0];
     end
   end
+
+  assign old_input  = call_q.index[5] ? last_b[call_q.index[4:0]][31:0] : last_a[call_q.index[4:0]][31:0];
+  assign slave_text = res_class_i == ErrOk ? {call_q.data[39:8], " -> ", bits_text({1'b0, res_data_i}, 3'd4)[39:8]}
+                                           : {call_q.data[39:8], " !> ", old_input};
 
   always_ff @(posedge clk_i) begin
     if (rst_i) begin
@@ -158,15 +162,23 @@ module asi_trace
       call_q         <= '0;
       request_text_o <= "              ";
       answer_text_o  <= "              ";
-      outputs_o      <= '1;
-      inputs_o       <= '0;
     end else begin
       ext_q          <= ext_d;
       call_q         <= call_d;
       request_text_o <= request_d;
       answer_text_o  <= answer_d;
-      outputs_o      <= outputs_d;
-      inputs_o       <= inputs_d;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (rst_i) begin
+      for (int k = 0; k < 32; k++) begin
+        last_a[k] <= "            ";
+        last_b[k] <= "            ";
+      end
+    end else if (res_i && call_q.is_dexg) begin
+      if (call_q.index[5]) last_b[call_q.index[4:0]] <= slave_text;
+      else last_a[call_q.index[4:0]] <= slave_text;
     end
   end
 endmodule

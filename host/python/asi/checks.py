@@ -72,6 +72,16 @@ def classify(pulses, bits, quiet_ns=QUIET_NS):
     return (ErrorClass.LENGTH, None) if length else (ErrorClass.OK, word)
 
 
+def bit_values(pulses, bits):
+    """What the pulses say about each bit, good telegram or not: [0, 1 or None without a pulse in its window]."""
+    out = [None] * bits
+    for dt, polarity in pulses:
+        n = 0 if dt == 0 else window(dt)
+        if n is not None and n % 2 == 0 and n // 2 < bits and out[n // 2] is None:
+            out[n // 2] = int(polarity > 0)
+    return out
+
+
 class RequestCollector:
     """A request while it arrives. t0: its first pulse; call: the 11 bits once it is complete and good."""
 

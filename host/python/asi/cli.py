@@ -31,6 +31,7 @@ from asi.capture import ARM_V, UNITS, CaptureError, Info, Options
 from asi.native import NativeError
 from asi.plant import SETTLE_NS, Plant, PlantError, load_plant, parse_time
 from asi.run import Runner
+from asi.telegram import parse_numbers
 from asi.telegram_log import HEADER, to_line
 
 OK, NOT_MET, BAD_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
@@ -237,14 +238,10 @@ def _output(path: Path | None) -> Iterator[TextIO]:
 
 
 def _numbers(text: str) -> frozenset[int]:
-    """'5,7,20-31' -> numbers 1..31."""
-    out: set[int] = set()
-    for part in text.split(","):
-        first, _, last = part.strip().partition("-")
-        if not (first.isdecimal() and (last or first).isdecimal() and 1 <= int(first) <= int(last or first) <= 31):
-            raise typer.BadParameter(f"'{part.strip()}' is no number or range within 1..31")
-        out.update(range(int(first), int(last or first) + 1))
-    return frozenset(out)
+    try:
+        return parse_numbers(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
 
 
 SignalP = Annotated[str | None, typer.Option("--p", metavar="SIGNAL", show_default=False,

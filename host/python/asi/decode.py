@@ -4,18 +4,16 @@ from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
-
-from rich.console import Console, Group
-from rich.table import Table
-from rich.text import Text
+from typing import TYPE_CHECKING, Any
 
 from asi.capture import Info, Options, Sink, read
 from asi.monitor import RX_TIMEOUT_NS, Monitor, Telegram
-from asi.plant import address_name, line_order
 from asi.regmap import ErrorClass
-from asi.telegram import decode_call
+from asi.telegram import address_name, decode_call, line_order
 from asi.telegram_log import to_record
+
+if TYPE_CHECKING:  # rich only where something is shown: the decoder itself runs on the standard library (DE-014)
+    from rich.console import Console, Group
 
 SCHEMA = "asi-decode 1"
 FIELDS = ("t_ns", "call", "address", "index", "data", "answer", "delay_ns", "class", "phase", "repeated", "request_ok",
@@ -162,6 +160,15 @@ class Decoder:
             self._phase_now()
         self._monitor.pulse(t_ns, polarity)
 
+    @property
+    def due_ns(self) -> float | None:
+        """Silence beyond this time finishes what is on the line; None between two telegrams."""
+        return self._monitor.due_ns
+
+    def settle(self, t_ns: float) -> None:
+        """The line was silent until t_ns: finish what that finishes. For live captures; files need it at no time."""
+        self._monitor.settle(t_ns)
+
     def end(self, t_ns: float) -> None:
         """The capture ends: what is not finished is named, not counted."""
         self._monitor.settle(t_ns)
@@ -284,8 +291,11 @@ def _us(time_ns: float | None) -> str:
     return "-" if time_ns is None else f"{time_ns / 1e3:.3f}"
 
 
-def render(statistics: dict[str, Any]) -> Group:
+def render(statistics: dict[str, Any]) -> "Group":
     """The statistics for a person; uses nothing but the dict."""
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
     table = Table(box=None, header_style="bold", padding=(0, 1))
     for name in ("addr", "requests", "answers", "repeated", "delay us min", "mean", "max", "deviation us"):
         table.add_column(name, justify="right", no_wrap=True)
@@ -325,5 +335,5 @@ def render(statistics: dict[str, Any]) -> Group:
     return Group(Text(""), *([table, Text("")] if statistics["slaves"] else []), foot)
 
 
-def show(statistics: dict[str, Any], console: Console) -> None:
+def show(statistics: dict[str, Any], console: "Console") -> None:
     console.print(render(statistics))

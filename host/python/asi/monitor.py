@@ -89,6 +89,15 @@ class Monitor:
                 self._waiting: "no answer yet", self._answer: "the answer is cut off"}.get(self._step)
         return (self._record, lack) if lack else None
 
+    @property
+    def due_ns(self):
+        """Silence beyond this time finishes the open record; None between two telegrams."""
+        if self._step == self._waiting:
+            return self._end_ns + RX_TIMEOUT_NS
+        if self._step == self._answer:
+            return self._t0 + ANSWER_NS
+        return self._last_ns + PAUSE_NS if self._step in (self._receiving, self._bad_request) else None
+
     # ------------------------------------------------------------------ one method per state
     def _idle(self, t_ns, polarity):
         self._t0, self._pulses = t_ns, [(0, polarity)]

@@ -20,7 +20,7 @@ from typing import Annotated, Any, Literal
 from pydantic import (BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, StrictBool, StrictInt, Tag,
                       ValidationError)
 
-from asi.telegram import index_name, parse_index
+from asi.telegram import address_name, index_name, parse_index
 
 SETTLE_NS = 1_000_000_000      # P_PWR_SETTLE of the product firmware: plants are written for it
 LONGEST_NS = 365 * 86_400 * 10**9
@@ -184,16 +184,6 @@ class Plant:
         move = lambda time_ns: max(0, time_ns + shift)  # noqa: E731 - what happened before the start happens at 0
         return replace(self, shift_ns=self.shift_ns + shift, duration_ns=move(self.duration_ns),
                        checks=tuple(replace(c, time_ns=move(c.time_ns)) for c in self.checks))
-
-
-def address_name(index: int, extended: bool) -> str:
-    """Index -> '5', '5A', '5B'; extended: the number is used with A/B addressing."""
-    return index_name(index) + ("A" if extended and 0 < index < 32 else "")
-
-
-def line_order(index: int) -> tuple[int, int]:
-    """Sort key: by number, A before B."""
-    return index & 31, index >> 5
 
 
 # ---------------------------------------------------------------- values

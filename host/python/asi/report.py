@@ -9,8 +9,9 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from asi.plant import Check, line_order
+from asi.plant import Check
 from asi.regmap import Phase
+from asi.telegram import line_order
 from asi.telegram_log import Counts, Tally
 from asi.window import INDICES, WindowError
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from asi import report
-from asi.plant import Action, Check, Faults, Plant, Slave, line_order
-from asi.telegram import index_name
+from asi.plant import Action, Check, Faults, Plant, Slave
+from asi.telegram import index_name, line_order
 from asi.telegram_log import TelegramLog
 from asi.window import HostWindow, State, WindowError
 

@@ -32,6 +32,27 @@ def parse_index(text):
     return int(number) + 32 * sel
 
 
+def address_name(index: int, extended: bool) -> str:
+    """Index -> '5', '5A', '5B'; extended: the number is used with A/B addressing."""
+    return index_name(index) + ("A" if extended and 0 < index < 32 else "")
+
+
+def line_order(index: int) -> tuple[int, int]:
+    """Sort key: by number, A before B."""
+    return index & 31, index >> 5
+
+
+def parse_numbers(text: str) -> frozenset[int]:
+    """'5,7,20-31' -> numbers 1..31; ValueError with the part that is none."""
+    out: set[int] = set()
+    for part in text.split(","):
+        first, _, last = part.strip().partition("-")
+        if not (first.isdecimal() and (last or first).isdecimal() and 1 <= int(first) <= int(last or first) <= 31):
+            raise ValueError(f"'{part.strip()}' is no number or range within 1..31")
+        out.update(range(int(first), int(last or first) + 1))
+    return frozenset(out)
+
+
 def encode_call(name, index=0, data=0, extended=False):
     """-> 11-bit call. data: I3..I0 (DEXG, WPAR, WID1) or the new address number (ADRA).
 

@@ -11,9 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from asi.plant import address_name
 from asi.regmap import ErrorClass, Phase
-from asi.telegram import decode_call
+from asi.telegram import address_name, decode_call
 
 HEADER = (f"# {'bus time us':>13}  {'call':<4} {'addr':<4} {'data':<5}    {'answer':<6}  {'delay us':>8}  "
           f"{'class':<14} {'phase':<13} remark\n")
