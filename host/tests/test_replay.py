@@ -34,7 +34,7 @@ def analog_csv(train, rate=8_000_000):
     ("pulses.vcd", lambda: vcd(levels(TRAIN))), ("pulses.csv", lambda: csv_text(levels(TRAIN))),
     ("man.csv", lambda: csv_text(man_levels(TRAIN), "time_ns,man")), ("volts.csv", lambda: analog_csv(TRAIN))])
 def test_all_kinds_of_captures(tmp_path, name, content):
-    """RP-001, ST-006, DE-001: pulses, Manchester level and voltage reach the receiver, which sees what the decoder sees."""
+    """RP-001, ST-006, DE-001: pulses, Manchester level and voltage reach the receiver; it sees what the decoder sees."""
     result = replay.replay(write(tmp_path, content(), name), FIRMWARE)
     assert result.calls == len(TALK) and not result.differences and not result.lost
     requests = [record for _, record in result.records if record.request]
@@ -73,7 +73,7 @@ def test_damaged_answers(tmp_path, seed):
 
 
 def test_silence_is_cut(tmp_path):
-    """RP-002: a capture of 40 s with two conversations takes the bus time of the conversations; times stay the capture's."""
+    """RP-002: a capture of 40 s with two conversations takes the time of these; times stay the capture's."""
     train = conversation(*TALK) + conversation(*TALK, start=40_000_000_000)
     result = replay.replay(write(tmp_path, csv_text(levels(train)), "long.csv"), FIRMWARE)
     assert result.calls == 2 * len(TALK) and not result.differences
@@ -163,7 +163,7 @@ def test_counters_against_the_line_monitor():
 
 
 def test_passive_monitor_is_silent():
-    """ST-007, ST-009: as a monitor the master sends nothing, and records what a foreign master says, until it is one again."""
+    """ST-007, ST-009: as a monitor the master sends nothing and records a foreign one, until it is master again."""
     chip, window, _ = start(1)
     chip.run(80 * MS)
     assert window.state().las == {1}

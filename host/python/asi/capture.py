@@ -53,11 +53,15 @@ class Options:
 class Sink:
     """Where a capture goes. pulse(t_ns, polarity); begin(t_ns): the capture starts; phase(t_ns, number): phase_o.
 
-    raw(t_ns, polarity, width_ns): what the comparators showed, before the filter, each pulse when it is over."""
+    raw(t_ns, polarity, width_ns): what the comparators showed, before the filter, each pulse when it is over.
+    Only for eye diagrams: end(t_ns, polarity): a comparator pulse ended; sample(t_ns, volts): without the DC part.
+    """
     pulse: Callable[[float, int], None]
     begin: Callable[[float], None] = lambda t_ns: None
     phase: Callable[[float, int], None] = lambda t_ns, number: None
     raw: Callable[[float, int, float], None] | None = None
+    end: Callable[[float, int], None] | None = None
+    sample: Callable[[float, float], None] | None = None
 
 
 @dataclass
@@ -100,7 +104,7 @@ class Comparators:
     """Levels of the two comparators -> pulses."""
 
     def __init__(self, sink: Sink, filter_ns: float, invert: bool = False):
-        self._pulse, self._raw, self._sign = sink.pulse, sink.raw, -1 if invert else 1
+        self._pulse, self._raw, self._end, self._sign = sink.pulse, sink.raw, sink.end, -1 if invert else 1
         self._p, self._n = _Filter(filter_ns), _Filter(filter_ns)
         self._rose: dict[int, float] = {}    # raw: polarity -> start of its pulse
 
@@ -124,11 +128,15 @@ class Comparators:
             since = p.flip()
             if rises:
                 found.append((since, self._sign))
+            elif self._end:
+                self._end(since, self._sign)
         if n.due(t_ns):
             rises = not n.state
             since = n.flip()
             if rises:
                 found.append((since, -self._sign))
+            elif self._end:
+                self._end(since, -self._sign)
         if len(found) == 2 and found[1][0] < found[0][0]:
             found.reverse()
         for since, polarity in found:
@@ -162,6 +170,7 @@ class Analog:
 
     def __init__(self, sink: Sink, filter_ns: float, invert: bool = False, arm_v: float = ARM_V):
         self._out = Comparators(sink, filter_ns)
+        self._sample = sink.sample
         self._sign, self._arm = -1.0 if invert else 1.0, arm_v
         self._first: list[tuple[float, float]] | None = []   # samples before the DC part is known
         self._base = 0.0
@@ -196,6 +205,8 @@ class Analog:
 
     def _step(self, t_ns: float, volts: float) -> None:
         value = volts - self._base
+        if self._sample:
+            self._sample(t_ns, value)
         self._base += value * min(1.0, (t_ns - self._last[0]) / BASE_NS)
         if self._threshold:
             self._compare(t_ns, value)

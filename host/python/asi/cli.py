@@ -24,15 +24,17 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from asi import decode as decoding
+from asi import html_report, report
 from asi import replay as replaying
-from asi import report
 from asi.bench import BenchError, name_waves, open_bench
 from asi.capture import ARM_V, UNITS, CaptureError, Info, Options
+from asi.eye import Eye
 from asi.native import NativeError
 from asi.plant import SETTLE_NS, Plant, PlantError, load_plant, parse_time
 from asi.run import Runner
 from asi.telegram import parse_numbers
 from asi.telegram_log import HEADER, to_line
+from asi.trace import Trace
 
 OK, NOT_MET, BAD_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 EXIT_CODES = {"ok": OK, "expectation not met": NOT_MET, "failed": FAILED, "interrupted": INTERRUPTED}
@@ -131,6 +133,7 @@ def run(
     waves: Annotated[bool, typer.Option("--waves", help="Write a waveform (slow; see sim/views/asi.gtkw).")] = False,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for report, logs and waves.")] = Path("build/run"),
     log: Annotated[bool, typer.Option(help="Write telegrams.log and telegrams.jsonl.")] = True,
+    html: Annotated[bool, typer.Option(help="Write report.html.")] = True,
     seed: Annotated[int | None, typer.Option(
         min=0, max=2**63 - 1, show_default=False, help="Random seed of the faults; default: the plant's.")] = None,
     quick: Annotated[bool | None, typer.Option(
@@ -169,16 +172,17 @@ def run(
             console.print(f"note: the line stays quiet until {report.ms(settle_ns)}, the wait after power-up")
         wave_path = out / "waves.part" if waves else None
         image = firmware or FIRMWARE / ("asi_test.hex" if quick else "asi.hex")
-        files = ["report.json", *(["telegrams.log", "telegrams.jsonl"] if log else [])]
+        files = ["report.json", *(["report.html"] if html else []),
+                 *(["telegrams.log", "telegrams.jsonl"] if log else [])]
         try:
             bench = open_bench(image, wave_path, described.seed)
         except BenchError as error:
             raise _fail(f"simulation: {error}", FAILED) from None
         try:
-            for old in ("waves.fst", "waves.vcd"):
-                (out / old).unlink(missing_ok=True)  # never the waves of another run beside this report
+            for old in ("waves.fst", "waves.vcd", *([] if html else ["report.html"])):
+                (out / old).unlink(missing_ok=True)  # never the waves or the page of another run beside this report
             with (_Bar if console.is_terminal else _Lines)(console) as progress:
-                result = Runner(described, bench, out, until_ns, log=log, progress=progress).run()
+                result = Runner(described, bench, out, until_ns, log=log, html=html, progress=progress).run()
             bench.close()
             if wave_path is not None:
                 files.append(name_waves(wave_path).name)
@@ -249,7 +253,8 @@ SignalP = Annotated[str | None, typer.Option("--p", metavar="SIGNAL", show_defau
 SignalN = Annotated[str | None, typer.Option("--n", metavar="SIGNAL", show_default=False,
                                              help="Negative comparator pulses; with --p.")]
 SignalMan = Annotated[list[str] | None, typer.Option(
-    "--man", metavar="SIGNAL", show_default=False, help="Manchester level, idle high; twice for a pair of which one is idle.")]
+    "--man", metavar="SIGNAL", show_default=False,
+    help="Manchester level, idle high; twice for a pair of which one is idle.")]
 SignalAnalog = Annotated[str | None, typer.Option("--analog", metavar="SIGNAL", show_default=False,
                                                   help="Voltage of the line.")]
 Inverted = Annotated[bool, typer.Option("--invert", help="Wires swapped; Manchester level idle low.")]
@@ -277,6 +282,8 @@ def decode(
                                              help="Where to; default: the terminal.")] = None,
     stats: Annotated[Path | None, typer.Option(
         "--stats", show_default=False, help="Write the statistics as JSON as well.")] = None,
+    html: Annotated[Path | None, typer.Option(
+        "--html", show_default=False, help="Write the report as one HTML page as well, with the eye.")] = None,
     p: SignalP = None, n: SignalN = None, man: SignalMan = None, analog: SignalAnalog = None, invert: Inverted = False,
     columns: Columns = None, time_unit: TimeUnit = None, arm: Arm = ARM_V,
     ab: Annotated[frozenset[int] | None, typer.Option(
@@ -295,8 +302,10 @@ def decode(
         known = ab.__contains__
     options = _options(p, n, man, analog, invert, columns, time_unit, arm)
     info, code = Info(), OK
+    trace, collected = (Trace(), Eye()) if html is not None else (None, None)
     with _output(out) as target:
-        decoder = decoding.Decoder(_writer(form, target), decoding.Extended(known))
+        decoder = decoding.Decoder(_writer(form, target), decoding.Extended(known), each=trace and trace.add,
+                                   eye=collected)
         try:
             decoding.decode(file, decoder, options, info)
         except CaptureError as error:
@@ -314,6 +323,11 @@ def decode(
             raise _fail(f"{stats}: {error.strerror}", BAD_INPUT) from None
     if code == BAD_INPUT and not decoder.requests:
         raise typer.Exit(code)
+    if html is not None:
+        try:
+            html_report.write(html_report.of_capture(result, trace, collected), html)
+        except OSError as error:
+            raise _fail(f"{html}: {error.strerror}", BAD_INPUT) from None
     if form in (Format.table, Format.none) or out is not None:
         console = Console(highlight=False)
         decoding.show(result, console if console.is_terminal else Console(highlight=False, width=120))

@@ -10,7 +10,7 @@ from asi.capture import Info, Options, Sink, read
 from asi.monitor import RX_TIMEOUT_NS, Monitor, Telegram
 from asi.regmap import ErrorClass
 from asi.telegram import address_name, decode_call, line_order
-from asi.telegram_log import to_record
+from asi.telegram_log import Span, to_record, wider
 
 if TYPE_CHECKING:  # rich only where something is shown: the decoder itself runs on the standard library (DE-014)
     from rich.console import Console, Group
@@ -59,26 +59,6 @@ class Extended:
 
 
 @dataclass
-class Span:
-    """Least, mean, largest of a time."""
-    count: int = 0
-    least: float = 0
-    largest: float = 0
-    total: float = 0
-
-    def add(self, value: float) -> None:
-        self.least = min(self.least, value) if self.count else value
-        self.largest = max(self.largest, value) if self.count else value
-        self.count += 1
-        self.total += value
-
-    def as_dict(self) -> dict[str, Any]:
-        return {"count": self.count, "min_ns": round(self.least) if self.count else None,
-                "mean_ns": round(self.total / self.count) if self.count else None,
-                "max_ns": round(self.largest) if self.count else None}
-
-
-@dataclass
 class SlaveCounts:
     """What one address did. deviation_ns: of the pulses of good answers, the largest with its sign."""
     requests: int = 0
@@ -117,9 +97,13 @@ class Cycles:
 
 
 class Decoder:
-    """Pulses in, records out: emit(record) per request, fields as in docs/telegram_log.md. Counts on the way."""
+    """Pulses in, records out: emit(record) per request, fields as in docs/telegram_log.md. Counts on the way.
 
-    def __init__(self, emit: Callable[[dict[str, Any]], None], extended: Extended | None = None):
+    each(record, telegram): like emit, with the monitor's telegram. eye: asi.eye.Eye to fill.
+    """
+
+    def __init__(self, emit: Callable[[dict[str, Any]], None], extended: Extended | None = None, *,
+                 each: Callable[[dict[str, Any], Telegram], None] | None = None, eye: Any = None):
         self.extended = extended or Extended()
         self.slaves: dict[int, SlaveCounts] = {}
         self.cycles = Cycles()
@@ -130,15 +114,16 @@ class Decoder:
         self.first_ns: float | None = None
         self.last_ns = self.begin_ns = self._pulse_ns = 0.0
         self.notes: list[str] = []
-        self._emit = emit
+        self._emit, self._each, self._eye = emit, each, eye
         self._sync_ns = float("inf")    # from here on a telegram that begins is a request
         self._phases: deque[tuple[float, int]] = deque()
         self._phase: int | None = None
         self._now = 0.0
-        self._monitor = Monitor(phase=self._phase_now, sink=self._finished)
+        self._monitor = Monitor(phase=self._phase_now, sink=self._finished, listen=eye and eye.telegram)
 
     def sink(self) -> Sink:
-        return Sink(self._pulse, self._begin, self._phase_changed)
+        eye = self._eye
+        return Sink(self._pulse, self._begin, self._phase_changed, eye and eye.end, eye and eye.sample)
 
     # ------------------------------------------------------------------ from the capture
     def _begin(self, t_ns: float) -> None:
@@ -194,6 +179,8 @@ class Decoder:
         self.extended.learn(telegram)
         record = self._record(telegram)
         self._count(telegram, record)
+        if self._each:
+            self._each(record, telegram)
         self._emit(record)
 
     def _record(self, telegram: Telegram) -> dict[str, Any]:
@@ -224,7 +211,7 @@ class Decoder:
         self.failed += not ok
         self.calls[record["call"]] += 1
         self.classes[record["class"]] += 1
-        self.request_deviation_ns = _wider(self.request_deviation_ns, telegram.request_dev_ns)
+        self.request_deviation_ns = wider(self.request_deviation_ns, telegram.request_dev_ns)
         self.cycles.add(telegram.t_ns, record["call"], telegram.call >> 5 & 31, telegram.repeated)
         if record["index"] is None:
             return
@@ -235,7 +222,7 @@ class Decoder:
         if telegram.data is not None:
             slave.answers += 1
             slave.delay.add(telegram.delay_ns)
-            slave.deviation_ns = _wider(slave.deviation_ns, telegram.answer_dev_ns)
+            slave.deviation_ns = wider(slave.deviation_ns, telegram.answer_dev_ns)
 
     # ------------------------------------------------------------------ statistics
     def statistics(self, path: Path, info: Info) -> dict[str, Any]:
@@ -266,10 +253,6 @@ class Decoder:
                 "repeated": slave.repeated, "answers": slave.answers, "by_class": dict(sorted(slave.classes.items())),
                 "delay_min_ns": delay["min_ns"], "delay_mean_ns": delay["mean_ns"], "delay_max_ns": delay["max_ns"],
                 "deviation_ns": _whole(slave.deviation_ns)}
-
-
-def _wider(before: float | None, new: float | None) -> float | None:
-    return new if before is None or (new is not None and abs(new) > abs(before)) else before
 
 
 def _whole(value: float | None) -> int | None:

@@ -199,7 +199,7 @@ class HostWindow:
         self.port.host_write(regmap.HOST_IRQ_ACK, 1, 15)
 
     def set_control(self, **bits: bool) -> int:
-        """Change bits of HOST_CTRL (protected_mode, offline, data_exchange, auto_address_enable, monitor); -> sequence."""
+        """Change bits of HOST_CTRL (protected_mode, offline, data_exchange, auto_address_enable, monitor) -> sequence."""
         for name, on in bits.items():
             bit = 1 << getattr(regmap, f"HOST_CTRL_{name.upper()}_LSB")
             self.control = self.control | bit if on else self.control & ~bit
