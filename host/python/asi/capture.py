@@ -59,9 +59,9 @@ class Sink:
     pulse: Callable[[float, int], None]
     begin: Callable[[float], None] = lambda t_ns: None
     phase: Callable[[float, int], None] = lambda t_ns, number: None
-    raw: Callable[[float, int, float], None] | None = None
     end: Callable[[float, int], None] | None = None
     sample: Callable[[float, float], None] | None = None
+    raw: Callable[[float, int, float], None] | None = None
 
 
 @dataclass
