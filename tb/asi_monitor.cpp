@@ -11,6 +11,21 @@ constexpr int64_t kRxOpen = 12'000;                // an answer may start this l
 constexpr int64_t kRxTimeout = 66'000;             // ... and no later than this
 constexpr int64_t kRepeatWithin = 220'000;         // request to request
 constexpr size_t kLogMax = 1 << 20;                // records kept for a reader that does not come
+constexpr int64_t kFoldFrom = 1'000, kFoldBin = 25;  // asi_pulse_counts
+constexpr int16_t kNoDeviation = INT16_MIN;
+
+// The pulse of a good telegram that is farthest from its grid point, with sign.
+int16_t deviation(const std::vector<Pulse> &pulses) {
+    int64_t widest = 0;
+    for (const Pulse &p : pulses) {
+        const int64_t d = p.t - pulses.front().t;
+        const int n = window_of(d);
+        if (n < 0) continue;  // after the length window
+        const int64_t late = d - n * kHalfBit;
+        if (late * late > widest * widest) widest = late;
+    }
+    return static_cast<int16_t>(widest);
+}
 }  // namespace
 
 ErrorClass check_telegram(const std::vector<Pulse> &pulses, int bits, unsigned &word) {
@@ -91,6 +106,10 @@ void Monitor::finish(ErrorClass error, unsigned data) {
     r.t_ns = request_.front().t;
     r.request_ok = check_telegram(request_, 14, word) == ErrorClass::kOk;
     r.call = static_cast<uint16_t>(word >> 2 & 0x7FF);
+    r.request_dev_ns = r.request_ok ? deviation(request_) : kNoDeviation;
+    r.answer_dev_ns = error == ErrorClass::kOk && !answer_.empty() ? deviation(answer_) : kNoDeviation;
+    count(request_, 0);
+    count(answer_, 1);
     r.delay_ns = answer_.empty() ? -1 : static_cast<int32_t>(answer_.front().t - request_.back().t);
     constexpr uint16_t kBroadcast = 1 << 10 | 31 << 5 | 0b10101, kProgram = 1 << 10 | 0b11101;
     if (error == ErrorClass::kNoResponse && r.request_ok && (r.call == kBroadcast || r.call == kProgram))
@@ -107,6 +126,16 @@ void Monitor::finish(ErrorClass error, unsigned data) {
     if (log_.size() == kLogMax) log_.pop_front();
     log_.push_back(r);
     state_ = State::kIdle;
+}
+
+void Monitor::count(const std::vector<Pulse> &pulses, int sender) {
+    const auto bin = [](int64_t d) { return (d + kFoldFrom) % kBit / kFoldBin; };
+    for (size_t i = 1; i < pulses.size(); i++) {
+        const int64_t d = pulses[i].t - pulses.front().t;
+        const int sign = pulses[i].polarity > 0;
+        counts_.starts[sender][sign][bin(d)]++;
+        counts_.ends[sender][sign][bin(d + pulses[i].width)]++;
+    }
 }
 
 int Monitor::drain(asi_telegram *out, int max) {

@@ -28,16 +28,19 @@ public:
     void pulse(const Pulse &pulse, bool from_master, uint8_t phase);
     void advance(int64_t t);  // nothing more came until t
     int drain(asi_telegram *out, int max);
+    const asi_pulse_counts &counts() const { return counts_; }
     uint64_t telegrams = 0, repeated = 0, failed = 0;  // failed: every answer that was not OK
 
 private:
     enum class State { kIdle, kRequest, kAnswer };
     void finish(ErrorClass error, unsigned data);
+    void count(const std::vector<Pulse> &pulses, int sender);
     State state_ = State::kIdle;
     std::vector<Pulse> request_, answer_;
     uint8_t phase_ = 0;
     asi_telegram last_{};
     std::deque<asi_telegram> log_;
+    asi_pulse_counts counts_{};
 };
 
 }  // namespace asi

@@ -425,6 +425,7 @@ int asi_net_inject(asi_net *net, int64_t t_ns, int32_t polarity, int32_t width_n
     return 0;
 }
 
+void asi_net_pulse_counts(const asi_net *net, asi_pulse_counts *out) { *out = net->monitor.counts(); }
 int asi_net_log(asi_net *net, asi_telegram *out, int max) {
     if (!net || max < 0 || (max > 0 && !out)) return kBad;
     net->monitor.advance(net->now);

@@ -65,8 +65,15 @@ typedef struct {
     uint8_t  repeated;     /* 1: immediate repetition of the call before */
     uint8_t  request_ok;   /* 0: the request itself was not a legal telegram */
     uint8_t  reserved;
+    int16_t  request_dev_ns, answer_dev_ns;  /* of a good telegram: its pulse farthest from the 3 us grid, with sign;
+                                                -32768: none, or not good */
 } asi_telegram;
 int      asi_net_log(asi_net *net, asi_telegram *out, int max);                /* drains, -> count; keeps 2^20 */
+
+/* All pulses of requests and answers, good or not, but each first one (it defines the grid): where in a bit time they
+   begin and end. [0 master, 1 slaves][0 negative, 1 positive][bin]: bin 0 begins 1 us before the grid, bins are 25 ns */
+typedef struct { uint32_t starts[2][2][240], ends[2][2][240]; } asi_pulse_counts;
+void     asi_net_pulse_counts(const asi_net *net, asi_pulse_counts *out);     /* since reset */
 
 typedef struct {
     uint64_t clocks, telegrams, repeated, failed;           /* failed: every answer that was not OK */

@@ -69,7 +69,7 @@ def keys(value, prefix=""):
             yield from keys(item, f"{prefix}[]") if isinstance(item, dict) else ()
     for key, item in value.items() if isinstance(value, dict) else ():
         path = f"{prefix}.{key}".lstrip(".")
-        if path in ("state.flags", "telegrams.by_call", "telegrams.by_class", "phases_ns"):
+        if path in ("state.flags", "telegrams.by_call", "telegrams.by_class", "phases_ns", "slaves[].by_class"):
             yield f"{path}.*"
         elif isinstance(item, (dict, list)) and path not in ("plant", "run"):
             if not isinstance(item, dict):

@@ -34,6 +34,9 @@ class NativeBench:
     def stats(self) -> Any:
         return self.chip.stats()
 
+    def pulse_counts(self) -> dict[str, Any]:
+        return self.net.pulse_counts()
+
     def add(self, slave: Slave) -> int:
         codes = slave.codes
         return self.net.add(address=slave.index, io=codes.io, id=codes.id, id1=codes.id1, id2=codes.id2,

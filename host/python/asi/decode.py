@@ -15,7 +15,7 @@ from asi.monitor import RX_TIMEOUT_NS, Monitor, Telegram
 from asi.plant import address_name, line_order
 from asi.regmap import ErrorClass
 from asi.telegram import decode_call
-from asi.telegram_log import to_record
+from asi.telegram_log import Span, to_record, wider
 
 SCHEMA = "asi-decode 1"
 FIELDS = ("t_ns", "call", "address", "index", "data", "answer", "delay_ns", "class", "phase", "repeated", "request_ok",
@@ -58,26 +58,6 @@ class Extended:
             self._i3[number] = (i3, times + 1 if i3 != last else 0)
             if self._i3[number][1] >= ALTERNATIONS - 1:
                 self._learned[number] = True
-
-
-@dataclass
-class Span:
-    """Least, mean, largest of a time."""
-    count: int = 0
-    least: float = 0
-    largest: float = 0
-    total: float = 0
-
-    def add(self, value: float) -> None:
-        self.least = min(self.least, value) if self.count else value
-        self.largest = max(self.largest, value) if self.count else value
-        self.count += 1
-        self.total += value
-
-    def as_dict(self) -> dict[str, Any]:
-        return {"count": self.count, "min_ns": round(self.least) if self.count else None,
-                "mean_ns": round(self.total / self.count) if self.count else None,
-                "max_ns": round(self.largest) if self.count else None}
 
 
 @dataclass
@@ -217,7 +197,7 @@ class Decoder:
         self.failed += not ok
         self.calls[record["call"]] += 1
         self.classes[record["class"]] += 1
-        self.request_deviation_ns = _wider(self.request_deviation_ns, telegram.request_dev_ns)
+        self.request_deviation_ns = wider(self.request_deviation_ns, telegram.request_dev_ns)
         self.cycles.add(telegram.t_ns, record["call"], telegram.call >> 5 & 31, telegram.repeated)
         if record["index"] is None:
             return
@@ -228,7 +208,7 @@ class Decoder:
         if telegram.data is not None:
             slave.answers += 1
             slave.delay.add(telegram.delay_ns)
-            slave.deviation_ns = _wider(slave.deviation_ns, telegram.answer_dev_ns)
+            slave.deviation_ns = wider(slave.deviation_ns, telegram.answer_dev_ns)
 
     # ------------------------------------------------------------------ statistics
     def statistics(self, path: Path, info: Info) -> dict[str, Any]:
@@ -259,10 +239,6 @@ class Decoder:
                 "repeated": slave.repeated, "answers": slave.answers, "by_class": dict(sorted(slave.classes.items())),
                 "delay_min_ns": delay["min_ns"], "delay_mean_ns": delay["mean_ns"], "delay_max_ns": delay["max_ns"],
                 "deviation_ns": _whole(slave.deviation_ns)}
-
-
-def _wider(before: float | None, new: float | None) -> float | None:
-    return new if before is None or (new is not None and abs(new) > abs(before)) else before
 
 
 def _whole(value: float | None) -> int | None:

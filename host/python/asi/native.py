@@ -37,6 +37,8 @@ class Telegram(NamedTuple):
     phase: int        # asi.regmap.Phase when the request began
     repeated: int     # 1: immediate repetition of the call before
     request_ok: int   # 0: the request itself was not a legal telegram
+    request_dev_ns: int | None  # good request: its pulse farthest from the 3 us grid, with sign
+    answer_dev_ns: int | None   # the same of a good answer
 
 
 class SlaveState(NamedTuple):
@@ -72,7 +74,14 @@ class Stats(NamedTuple):
 
 
 _PULSE = struct.Struct("=qii")
-_TELEGRAM = struct.Struct("=qiHBBBBBx4x")
+_TELEGRAM = struct.Struct("=qiHBBBBBxhh")
+_NO_DEVIATION = -32768
+
+
+def _telegram(fields):
+    request_dev, answer_dev = fields[8:]
+    return Telegram(*fields[:8], None if request_dev == _NO_DEVIATION else request_dev,
+                    None if answer_dev == _NO_DEVIATION else answer_dev)
 
 
 def declarations():
@@ -104,7 +113,7 @@ def _drain(ffi, function, handle):
     out = []
     buffer = ffi.new("asi_telegram[]", _BULK)
     while count := _check(function(handle, buffer, _BULK), "log"):
-        out += map(Telegram._make, _TELEGRAM.iter_unpack(ffi.buffer(buffer, count * _TELEGRAM.size)))
+        out += map(_telegram, _TELEGRAM.iter_unpack(ffi.buffer(buffer, count * _TELEGRAM.size)))
     return out
 
 
@@ -173,6 +182,14 @@ class Net:
     def log(self):
         """-> [Telegram], drained."""
         return _drain(self._ffi, self._lib.asi_net_log, self._net)
+
+    def pulse_counts(self):
+        """-> {"starts": [[bins of negative, of positive pulses] of the master, of the slaves], "ends": the same}:
+        where in a bit time pulses began and ended since reset (asi_pulse_counts in tb/asi_tb.h)."""
+        counts = self._ffi.new("asi_pulse_counts *")
+        self._lib.asi_net_pulse_counts(self._net, counts)
+        return {name: [[list(bins) for bins in sender] for sender in getattr(counts, name)]
+                for name in ("starts", "ends")}
 
 
 class Chip:

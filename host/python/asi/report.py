@@ -82,6 +82,14 @@ def _tally(tally: Tally) -> dict[str, int]:
     return {"requests": tally.requests, "repeated": tally.repeated, "failed": tally.failed}
 
 
+def _line(tally: Tally) -> dict[str, Any]:
+    """What the line showed of one address; the names are those of the decoder's statistics."""
+    delay = tally.delay.as_dict()
+    return {"answers": tally.answers, "by_class": dict(sorted(tally.classes.items())),
+            "delay_min_ns": delay["min_ns"], "delay_mean_ns": delay["mean_ns"], "delay_max_ns": delay["max_ns"],
+            "deviation_ns": tally.deviation_ns}
+
+
 def _slaves(plant, state, inputs, outputs, detected, counts) -> list[dict[str, Any]]:
     """One row per address that the plant, the projection or the master knows."""
     known = {slave.index: slave for slave in reversed(plant.slaves)}
@@ -97,17 +105,14 @@ def _slaves(plant, state, inputs, outputs, detected, counts) -> list[dict[str, A
             **{name: index in getattr(state, name) for name in LISTS},
             "inputs": None if inputs is None or not index else f"{inputs[index]:04b}",
             "outputs": None if not index else f"{outputs[index]:04b}",
-            **_tally(counts.by_index.get(index, Tally())),
+            **_tally(tally := counts.by_index.get(index, Tally())), **_line(tally),
         })
     rest = Tally()
     for index in INDICES:
         if index in counts.by_index and all(row["index"] != index for row in rows):
-            tally = counts.by_index[index]
-            rest.requests += tally.requests
-            rest.repeated += tally.repeated
-            rest.failed += tally.failed
+            rest.add(counts.by_index[index])
     rows.append({"address": None, "index": None, "name": None, "profile": None, "detected": None,
-                 **{name: False for name in LISTS}, "inputs": None, "outputs": None, **_tally(rest)})
+                 **{name: False for name in LISTS}, "inputs": None, "outputs": None, **_tally(rest), **_line(rest)})
     return rows
 
 

@@ -21,11 +21,58 @@ _DATA_CALLS = {"DEXG": 4, "WPAR": 4, "WID1": 4, "ADRA": 5}
 
 
 @dataclass
+class Span:
+    """Least, mean, largest of a time."""
+    count: int = 0
+    least: float = 0
+    largest: float = 0
+    total: float = 0
+
+    def add(self, value: float) -> None:
+        self.least = min(self.least, value) if self.count else value
+        self.largest = max(self.largest, value) if self.count else value
+        self.count += 1
+        self.total += value
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"count": self.count, "min_ns": round(self.least) if self.count else None,
+                "mean_ns": round(self.total / self.count) if self.count else None,
+                "max_ns": round(self.largest) if self.count else None}
+
+
+def wider(before: float | None, new: float | None) -> float | None:
+    """The one of two distances that is farther from 0; None: not measured."""
+    return new if before is None or (new is not None and abs(new) > abs(before)) else before
+
+
+@dataclass
 class Tally:
-    """Requests of one address: on the line, of these immediate repetitions, of these without a valid answer."""
+    """Requests of one address: on the line, of these immediate repetitions, of these without a valid answer.
+
+    deviation_ns: of the pulses of good answers, the largest distance from the 3 us grid, with its sign.
+    """
     requests: int = 0
     repeated: int = 0
     failed: int = 0
+    answers: int = 0
+    classes: Counter = field(default_factory=Counter)
+    delay: Span = field(default_factory=Span)
+    deviation_ns: float | None = None
+
+    def add(self, other: "Tally") -> None:
+        """Take in what another address did."""
+        self.requests += other.requests
+        self.repeated += other.repeated
+        self.failed += other.failed
+        self.answers += other.answers
+        self.classes += other.classes
+        if other.delay.count:
+            mine = self.delay
+            mine.least = min(mine.least, other.delay.least) if mine.count else other.delay.least
+            mine.largest = max(mine.largest, other.delay.largest)
+            mine.count += other.delay.count
+            mine.total += other.delay.total
+        self.deviation_ns = wider(self.deviation_ns, other.deviation_ns)
 
 
 @dataclass
@@ -81,10 +128,15 @@ def _name(enum: type, value: int) -> str:
 
 
 class TelegramLog:
-    """Counts telegrams and, with a folder, writes telegrams.log and telegrams.jsonl into it. A context manager."""
+    """Counts telegrams and, with a folder, writes telegrams.log and telegrams.jsonl into it. A context manager.
 
-    def __init__(self, folder: Path | None, extended: Callable[[int], bool]):
+    each(record, telegram): called for every telegram.
+    """
+
+    def __init__(self, folder: Path | None, extended: Callable[[int], bool],
+                 each: Callable[[dict[str, Any], Any], None] | None = None):
         self.counts = Counts()
+        self._each = each
         self._extended = extended
         self._text = self._json = None
         if folder is not None:
@@ -108,17 +160,25 @@ class TelegramLog:
         number = 0
         for number, telegram in enumerate(telegrams, 1):
             record = to_record(telegram, self._extended)
-            self._count(record)
+            self._count(record, telegram)
+            if self._each is not None:
+                self._each(record, telegram)
             if self._text is not None:
                 self._text.write(to_line(record) + "\n")
                 self._json.write(json.dumps(record, separators=(",", ":")) + "\n")
         return number
 
-    def _count(self, record: dict[str, Any]) -> None:
+    def _count(self, record: dict[str, Any], telegram: Any) -> None:
         counts, failed = self.counts, record["class"] != ErrorClass.OK.name
         tallies = [counts.total]
         if record["index"] is not None:
-            tallies.append(counts.by_index.setdefault(record["index"], Tally()))
+            tally = counts.by_index.setdefault(record["index"], Tally())
+            tallies.append(tally)
+            tally.classes[record["class"]] += 1
+            if record["answer"] is not None:
+                tally.answers += 1
+                tally.delay.add(record["delay_ns"])
+                tally.deviation_ns = wider(tally.deviation_ns, getattr(telegram, "answer_dev_ns", None))
         for tally in tallies:
             tally.requests += 1
             tally.repeated += record["repeated"]
