@@ -6,6 +6,7 @@ It is no model of the master: detection takes no time, a lost slave is gone with
 from types import SimpleNamespace
 
 from asi import regmap
+from asi.eye import empty
 from asi.plant import Faults
 from asi.regmap import ErrorClass, Phase
 from asi.telegram import encode_call
@@ -47,6 +48,9 @@ class FakeBench:
     def telegrams(self):
         log, self.log = self.log, []
         return log
+
+    def pulse_counts(self):
+        return empty()
 
     def stats(self):
         times = self.cycle_times

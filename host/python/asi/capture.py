@@ -50,10 +50,15 @@ class Options:
 
 @dataclass
 class Sink:
-    """Where a capture goes. pulse(t_ns, polarity); begin(t_ns): the capture starts; phase(t_ns, number): phase_o."""
+    """Where a capture goes. pulse(t_ns, polarity); begin(t_ns): the capture starts; phase(t_ns, number): phase_o.
+
+    Only for eye diagrams: end(t_ns, polarity): a comparator pulse ended; sample(t_ns, volts): without the DC part.
+    """
     pulse: Callable[[float, int], None]
     begin: Callable[[float], None] = lambda t_ns: None
     phase: Callable[[float, int], None] = lambda t_ns, number: None
+    end: Callable[[float, int], None] | None = None
+    sample: Callable[[float, float], None] | None = None
 
 
 @dataclass
@@ -95,8 +100,9 @@ class _Filter:
 class Comparators:
     """Levels of the two comparators -> pulses."""
 
-    def __init__(self, pulse: Callable[[float, int], None], filter_ns: float, invert: bool = False):
-        self._pulse, self._sign = pulse, -1 if invert else 1
+    def __init__(self, pulse: Callable[[float, int], None], filter_ns: float, invert: bool = False,
+                 end: Callable[[float, int], None] | None = None):
+        self._pulse, self._sign, self._end = pulse, -1 if invert else 1, end
         self._p, self._n = _Filter(filter_ns), _Filter(filter_ns)
 
     def levels(self, t_ns: float, p: int, n: int) -> None:
@@ -112,11 +118,15 @@ class Comparators:
             since = p.flip()
             if rises:
                 found.append((since, self._sign))
+            elif self._end:
+                self._end(since, self._sign)
         if n.due(t_ns):
             rises = not n.state
             since = n.flip()
             if rises:
                 found.append((since, -self._sign))
+            elif self._end:
+                self._end(since, -self._sign)
         if len(found) == 2 and found[1][0] < found[0][0]:
             found.reverse()
         for since, polarity in found:
@@ -147,8 +157,10 @@ class Analog:
     """
 
     def __init__(self, pulse: Callable[[float, int], None], filter_ns: float, invert: bool = False,
-                 arm_v: float = ARM_V):
-        self._out = Comparators(pulse, filter_ns)
+                 arm_v: float = ARM_V, end: Callable[[float, int], None] | None = None,
+                 sample: Callable[[float, float], None] | None = None):
+        self._out = Comparators(pulse, filter_ns, end=end)
+        self._sample = sample
         self._sign, self._arm = -1.0 if invert else 1.0, arm_v
         self._first: list[tuple[float, float]] | None = []   # samples before the DC part is known
         self._base = 0.0
@@ -183,6 +195,8 @@ class Analog:
 
     def _step(self, t_ns: float, volts: float) -> None:
         value = volts - self._base
+        if self._sample:
+            self._sample(t_ns, value)
         self._base += value * min(1.0, (t_ns - self._last[0]) / BASE_NS)
         if self._threshold:
             self._compare(t_ns, value)
@@ -228,11 +242,11 @@ class _Front:
         self.kind = kind
         filter_ns = max(0.0, FILTER_NS - sample_ns)  # a sampled pulse may look one sample shorter than it is
         if kind == "pulses":
-            self._end = Comparators(sink.pulse, filter_ns, options.invert)
+            self._end = Comparators(sink.pulse, filter_ns, options.invert, sink.end)
         elif kind == "man":
             self._end = Manchester(sink.pulse, filter_ns, options.invert)
         else:
-            self._end = Analog(sink.pulse, filter_ns, options.invert, options.arm_v)
+            self._end = Analog(sink.pulse, filter_ns, options.invert, options.arm_v, sink.end, sink.sample)
         self._idle = 0 if options.invert else 1
 
     def values(self, t_ns: float, values: Sequence[Any]) -> None:

@@ -23,12 +23,14 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from asi import decode as decoding
-from asi import report
+from asi import html_report, report
 from asi.bench import BenchError, name_waves, open_bench
 from asi.capture import ARM_V, UNITS, CaptureError, Info, Options
+from asi.eye import Eye
 from asi.plant import SETTLE_NS, Plant, PlantError, load_plant, parse_time
 from asi.run import Runner
 from asi.telegram_log import HEADER, to_line
+from asi.trace import Trace
 
 OK, NOT_MET, BAD_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 EXIT_CODES = {"ok": OK, "expectation not met": NOT_MET, "failed": FAILED, "interrupted": INTERRUPTED}
@@ -126,6 +128,7 @@ def run(
     waves: Annotated[bool, typer.Option("--waves", help="Write a waveform (slow; see sim/views/asi.gtkw).")] = False,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for report, logs and waves.")] = Path("build/run"),
     log: Annotated[bool, typer.Option(help="Write telegrams.log and telegrams.jsonl.")] = True,
+    html: Annotated[bool, typer.Option(help="Write report.html.")] = True,
     seed: Annotated[int | None, typer.Option(
         min=0, max=2**63 - 1, show_default=False, help="Random seed of the faults; default: the plant's.")] = None,
     quick: Annotated[bool | None, typer.Option(
@@ -164,16 +167,16 @@ def run(
             console.print(f"note: the line stays quiet until {report.ms(settle_ns)}, the wait after power-up")
         wave_path = out / "waves.part" if waves else None
         image = firmware or FIRMWARE / ("asi_test.hex" if quick else "asi.hex")
-        files = ["report.json", *(["telegrams.log", "telegrams.jsonl"] if log else [])]
+        files = ["report.json", *(["report.html"] if html else []), *(["telegrams.log", "telegrams.jsonl"] if log else [])]
         try:
             bench = open_bench(image, wave_path, described.seed)
         except BenchError as error:
             raise _fail(f"simulation: {error}", FAILED) from None
         try:
-            for old in ("waves.fst", "waves.vcd"):
-                (out / old).unlink(missing_ok=True)  # never the waves of another run beside this report
+            for old in ("waves.fst", "waves.vcd", *([] if html else ["report.html"])):
+                (out / old).unlink(missing_ok=True)  # never the waves or the page of another run beside this report
             with (_Bar if console.is_terminal else _Lines)(console) as progress:
-                result = Runner(described, bench, out, until_ns, log=log, progress=progress).run()
+                result = Runner(described, bench, out, until_ns, log=log, html=html, progress=progress).run()
             bench.close()
             if wave_path is not None:
                 files.append(name_waves(wave_path).name)
@@ -251,6 +254,8 @@ def decode(
                                              help="Where to; default: the terminal.")] = None,
     stats: Annotated[Path | None, typer.Option(
         "--stats", show_default=False, help="Write the statistics as JSON as well.")] = None,
+    html: Annotated[Path | None, typer.Option(
+        "--html", show_default=False, help="Write the report as one HTML page as well, with the eye.")] = None,
     p: Annotated[str | None, typer.Option("--p", metavar="SIGNAL", show_default=False,
                                           help="Positive comparator pulses; with --n.")] = None,
     n: Annotated[str | None, typer.Option("--n", metavar="SIGNAL", show_default=False,
@@ -285,8 +290,10 @@ def decode(
     options = Options(p, n, tuple(man or ()), analog, invert, tuple(c.strip() for c in columns.split(",")) if columns
                       else (), time_unit, arm)
     info, code = Info(), OK
+    trace, collected = (Trace(), Eye()) if html is not None else (None, None)
     with _output(out) as target:
-        decoder = decoding.Decoder(_writer(form, target), decoding.Extended(known))
+        decoder = decoding.Decoder(_writer(form, target), decoding.Extended(known), each=trace and trace.add,
+                                   eye=collected)
         try:
             decoding.decode(file, decoder, options, info)
         except CaptureError as error:
@@ -304,6 +311,11 @@ def decode(
             raise _fail(f"{stats}: {error.strerror}", BAD_INPUT) from None
     if code == BAD_INPUT and not decoder.requests:
         raise typer.Exit(code)
+    if html is not None:
+        try:
+            html_report.write(html_report.of_capture(result, trace, collected), html)
+        except OSError as error:
+            raise _fail(f"{html}: {error.strerror}", BAD_INPUT) from None
     if form in (Format.table, Format.none) or out is not None:
         console = Console(highlight=False)
         decoding.show(result, console if console.is_terminal else Console(highlight=False, width=120))

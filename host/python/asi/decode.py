@@ -99,9 +99,13 @@ class Cycles:
 
 
 class Decoder:
-    """Pulses in, records out: emit(record) per request, fields as in docs/telegram_log.md. Counts on the way."""
+    """Pulses in, records out: emit(record) per request, fields as in docs/telegram_log.md. Counts on the way.
 
-    def __init__(self, emit: Callable[[dict[str, Any]], None], extended: Extended | None = None):
+    each(record, telegram): like emit, with the monitor's telegram. eye: asi.eye.Eye to fill.
+    """
+
+    def __init__(self, emit: Callable[[dict[str, Any]], None], extended: Extended | None = None, *,
+                 each: Callable[[dict[str, Any], Telegram], None] | None = None, eye: Any = None):
         self.extended = extended or Extended()
         self.slaves: dict[int, SlaveCounts] = {}
         self.cycles = Cycles()
@@ -112,15 +116,16 @@ class Decoder:
         self.first_ns: float | None = None
         self.last_ns = self.begin_ns = self._pulse_ns = 0.0
         self.notes: list[str] = []
-        self._emit = emit
+        self._emit, self._each, self._eye = emit, each, eye
         self._sync_ns = float("inf")    # from here on a telegram that begins is a request
         self._phases: deque[tuple[float, int]] = deque()
         self._phase: int | None = None
         self._now = 0.0
-        self._monitor = Monitor(phase=self._phase_now, sink=self._finished)
+        self._monitor = Monitor(phase=self._phase_now, sink=self._finished, listen=eye and eye.telegram)
 
     def sink(self) -> Sink:
-        return Sink(self._pulse, self._begin, self._phase_changed)
+        eye = self._eye
+        return Sink(self._pulse, self._begin, self._phase_changed, eye and eye.end, eye and eye.sample)
 
     # ------------------------------------------------------------------ from the capture
     def _begin(self, t_ns: float) -> None:
@@ -167,6 +172,8 @@ class Decoder:
         self.extended.learn(telegram)
         record = self._record(telegram)
         self._count(telegram, record)
+        if self._each:
+            self._each(record, telegram)
         self._emit(record)
 
     def _record(self, telegram: Telegram) -> dict[str, Any]:

@@ -41,13 +41,17 @@ class Monitor:
     """Listens on a line; finished records are in telegrams. phase: function giving phase_e, called per request.
 
     sink: gets the finished records instead of telegrams, so that nothing grows.
+    listen(sender, t0_ns, pulses): gets the pulses of each request (sender 0) and answer (1), good or not, as
+    [(ns from the first pulse at t0_ns, polarity)].
     """
 
-    def __init__(self, line=None, phase=lambda: 0, sink=None):
+    def __init__(self, line=None, phase=lambda: 0, sink=None, listen=None):
         self.telegrams = []
+        self._listen = listen
         self._sink = sink or self.telegrams.append
         self._phase = phase
         self._record = self._previous = None
+        self._asked = None          # (t0, pulses) of the request, for listen
         self._step = self._idle
         self._pulses = []           # (ns from the first, polarity) of the telegram on the line
         self._t0 = self._end_ns = 0
@@ -102,6 +106,7 @@ class Monitor:
             self._step = self._bad_request
         elif self._request.call is not None:
             self._end_ns = t_ns
+            self._asked = (self._t0, self._pulses)
             self._record.call = self._request.call
             self._record.request_dev_ns = deviation(self._pulses)
             self._step = self._waiting
@@ -138,5 +143,11 @@ class Monitor:
         record.repeated = bool(previous and previous.error_class != ErrorClass.OK and previous.call == record.call
                                and record.call is not None and record.t_ns - previous.t_ns <= REPEAT_NS)
         self._previous = record
+        if self._listen:
+            if self._asked is not None:
+                self._listen(0, *self._asked)
+            if self._step in (self._answer, self._bad_request):
+                self._listen(int(self._step == self._answer), self._t0, self._pulses)
+        self._asked = None
         self._step = step
         self._sink(record)

@@ -10,10 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-from asi import report
+from asi import html_report, report
 from asi.plant import Action, Check, Faults, Plant, Slave, line_order
 from asi.telegram import index_name
 from asi.telegram_log import TelegramLog
+from asi.trace import Trace
 from asi.window import HostWindow, State, WindowError
 
 CHUNK_NS = 10_000_000        # longest step: Ctrl-C and the progress display react after at most this
@@ -32,6 +33,7 @@ class Bench(Protocol):
 
     def time(self) -> int: ...
     def run(self, until_ns: int) -> int: ...
+    def pulse_counts(self) -> dict[str, Any]: ...
     def host_read(self, addr: int) -> int: ...
     def host_write(self, addr: int, data: int, be: int = 15) -> None: ...
     def telegrams(self) -> list[Any]: ...
@@ -76,7 +78,7 @@ class Runner:
     """One run. `progress` is called after each step with (bus time in ns, end in ns, cycles so far)."""
 
     def __init__(self, plant: Plant, bench: Bench, folder: Path, until_ns: int | None = None, *, log: bool = True,
-                 progress: Callable[[int, int, int], None] | None = None):
+                 html: bool = True, progress: Callable[[int, int, int], None] | None = None):
         self.plant, self.bench, self.folder = plant, bench, folder
         self.until_ns = plant.duration_ns if until_ns is None else until_ns
         self.progress = progress or (lambda now, end, cycles: None)
@@ -84,6 +86,7 @@ class Runner:
         self.configured = False
         self.version: str | None = None
         self._log_wanted = log
+        self._trace = Trace() if html else None
         self._pending: tuple[int, int] | None = None  # open commit: sequence, time of the write
         self._host_queue: deque[Action] = deque()
         self._checks = deque(plant.checks)
@@ -95,7 +98,8 @@ class Runner:
         started = time.monotonic()
         interrupted, error = False, None
         self.folder.mkdir(parents=True, exist_ok=True)
-        with TelegramLog(self.folder if self._log_wanted else None, self.plant.extended) as log:
+        with TelegramLog(self.folder if self._log_wanted else None, self.plant.extended,
+                         self._trace and self._trace.add) as log:
             try:
                 self._loop(log)
             except KeyboardInterrupt:
@@ -106,6 +110,13 @@ class Runner:
             wall_s = time.monotonic() - started
             out = report.build(self, log.counts, wall_s=wall_s, interrupted=interrupted, error=error)
         report.write(out, self.folder / "report.json")
+        if self._trace is not None:
+            for check in out["checks"]:
+                if check["result"] != "not reached":
+                    self._trace.event(check["at_ns"], "check", "; ".join([f"{check['name']} {check['result']}",
+                                                                          *check["differences"]]))
+            html_report.write(html_report.of_run(out, self._trace, self.bench.pulse_counts()),
+                              self.folder / "report.html")
         return out
 
     def results(self) -> list[dict[str, Any]]:
@@ -146,6 +157,8 @@ class Runner:
     # ------------------------------------------------------------ the world
     def _act(self, action: Action) -> None:
         bench = self.bench
+        if self._trace is not None:
+            self._trace.event(bench.time(), *self._told(action))
         handles = [self._handles[position] for position in action.slaves]
         if action.do in ("output", "mode", "offline", "data_exchange", "auto_address"):
             self._host_queue.append(action)
@@ -169,6 +182,24 @@ class Runner:
             }[action.do]
             for handle in handles:
                 work(handle)
+
+    def _told(self, action: Action) -> tuple[str, str]:
+        """-> kind and text of an event, for people."""
+        value, words = action.value, [action.do.replace("_", " ")]
+        if action.do == "output":
+            return "output", f"{self.plant.name_of(value[0])} := {value[1]:04b}"
+        who = ", ".join(f"{slave.address} {slave.name}" for slave in map(self.plant.slaves.__getitem__, action.slaves))
+        if action.do == "inputs":
+            return "input", f"{who} := {value:04b}"
+        if isinstance(value, Faults):
+            words += [f"{name.replace('_', ' ')} {number / 65536:.2%}" if not name.endswith("_ns") else
+                      f"{name[:-3]} {number / 1000:g} us" for name, number in vars(value).items() if number]
+        elif action.do == "mode":
+            words.append("protected" if value else "configuration")
+        elif value is not None:
+            words.append("on" if value else "off")
+        return ("host" if action.do in ("mode", "offline", "data_exchange", "auto_address") else "world",
+                f"{words[0]} {who}{': ' + ', '.join(words[1:]) if words[1:] else ''}".strip())
 
     # ------------------------------------------------------------ the host
     def _host(self) -> None:
