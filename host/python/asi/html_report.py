@@ -129,7 +129,7 @@ def _slaves(rows: Sequence[dict[str, Any]], trace: Trace, of_run: bool) -> str:
             f'{escape(row["address"])}</button>' if row["address"] else "other") + "</th>"]
         for c in columns:
             value = c.value(row)
-            bad = c.numeric and bool(value) and (c.key == "failed" or c.key.startswith("by_class."))
+            bad = row["address"] is not None and c.numeric and bool(value) and (c.key == "failed" or c.key.startswith("by_class."))
             if c.key == "lists":
                 bad = row["lps"] != row["las"] or (row["index"] == 0 and row["lds"])
             cells.append(f'<td data-key="{escape(c.key)}" data-v="{escape(json.dumps(value) if c.numeric else str(value or ""))}"'

@@ -108,14 +108,14 @@
     g.font = "12px system-ui, sans-serif";
     g.textBaseline = "middle";
     drawGaps(g, x);
-    drawBand(g, x, width);
-    drawEvents(g, x);
     g.strokeStyle = colours.line;
     for (const lane of ["ask", "reply"]) {
       const y = LANES[lane][0] + LANES[lane][1] + .5;
       g.beginPath(); g.moveTo(0, y); g.lineTo(width, y); g.stroke();
     }
     const first = firstFrom(from - 400000), last = firstFrom(to);
+    drawBand(g, x, width, nsPerPx > 60000 ? [] : [first, last]);
+    drawEvents(g, x);
     if (nsPerPx > 60000) drawDense(g, first, last, width, nsPerPx);
     else drawBlocks(g, x, first, last, nsPerPx);
     drawAxis(g, width);
@@ -146,16 +146,24 @@
     }
   }
 
-  function drawBand(g, x, width) {
-    const [y, height] = LANES.band;
+  function drawBand(g, x, width, [first, last]) {
+    const [y, height] = LANES.band, names = [];
     for (const [t0, t1, name] of line.phases) {
       const x0 = Math.max(0, x(t0)), x1 = Math.min(width, Math.max(x(t1), x(t0) + 1));
       if (x1 < 0 || x0 > width || !name) continue;
       g.fillStyle = colours["p-" + name.toLowerCase()] || colours.soft;
       g.fillRect(x0, y, x1 - x0, height);
-      g.fillStyle = colours.text;
-      fitText(g, name === "CYCLES" ? "cyclic operation" : name, x0 + 5, y + height / 2 + .5, x1 - x0 - 8);
+      names.push([name === "CYCLES" ? "cyclic operation" : name, x0, x1]);
     }
+    for (let i = first; i < last; i++) {    // inside a cycle, until the next call
+      const name = line.phase_names[phase[i]], t1 = i + 1 < count ? Math.min(time[i + 1], time[i] + 160000) : endOf(i);
+      if (name !== "INCLUSION" && name !== "MANAGEMENT") continue;
+      g.fillStyle = colours["p-" + name.toLowerCase()];
+      g.fillRect(x(time[i]), y, Math.max(1, x(t1) - x(time[i])), height);
+      if (x(t1) - x(time[i]) > 70) names.push([name, x(time[i]), x(t1)]);
+    }
+    g.fillStyle = colours.text;
+    for (const [name, x0, x1] of names) fitText(g, name, x0 + 5, y + height / 2 + .5, x1 - x0 - 8);
   }
 
   const MARKS = {check: "good", slave: "c-read", phase: "dim", world: "e4", host: "accent", input: "c-answer", output: "c-dexg"};
@@ -258,7 +266,7 @@
     g.fillRect(x0, top, width, tall);
     if (striped && width > 6) {
       g.fillStyle = colours.card;
-      for (let s = x0 + 2; s < x0 + width - 2; s += 6) g.fillRect(s, top + tall - 4, 3, 2);
+      for (let s = x0 + 2; s < x0 + width - 2; s += 6) g.fillRect(s, top + 1, 3, 2);
     }
     if (!near) {
       g.fillStyle = colours.card;
@@ -268,7 +276,7 @@
     g.fillStyle = colours.card;
     fitText(g, text, x0 + 4, top + tall / 2 + .5, width - 6);
     if (value === null || value === undefined) return;
-    const word = telegramWord(value, bits), middle = y + 52, swing = 20;
+    const word = telegramWord(value), middle = y + 41, swing = 15;
     g.strokeStyle = fill;
     g.beginPath();
     let at = x0;
@@ -288,12 +296,12 @@
     if (2 * HALF_NS / nsPerPx > 11) {
       g.fillStyle = colours.dim;
       for (let k = 0; k < bits; k++) {
-        g.fillText(String(word >> (bits - 1 - k) & 1), x0 + 2 * k * HALF_NS / nsPerPx - 1, y + height - 1 + (lane === "ask" ? 1 : 0) - 5);
+        g.fillText(String(word >> (bits - 1 - k) & 1), x0 + 2 * k * HALF_NS / nsPerPx - 1, y + height - 9);
       }
     }
   }
   const ones = (word) => { let n = 0; for (; word; word >>= 1) n ^= word & 1; return n; };
-  const telegramWord = (value, bits) => value << 2 | ones(value) << 1 | 1 | (bits ? 0 : 0);
+  const telegramWord = (value) => value << 2 | ones(value) << 1 | 1;
   const bits4 = (value) => value.toString(2).padStart(4, "0");
 
   const UNITS = [[1e9, "s"], [1e6, "ms"], [1e3, "µs"]];
@@ -342,6 +350,7 @@
   }
 
   // ---------------------------------------------------------------- one telegram in words
+  const IDLE = byId("detail").textContent;
   const us = (ns) => (ns / 1000).toFixed(3);
   function describe(i) {
     const it = calls[call[i]], ok = (flags[i] & REQUEST_OK) !== 0, out = [];
@@ -353,15 +362,19 @@
     if (ok && answer[i] !== NONE) out.push(["answer ", bits4(answer[i])]);
     out.push(["", isProbe(i) ? "nobody answered (looking for slaves)" : className(cls[i])]);
     if (answers(i)) out.push(["delay ", us(delay[i]) + " µs"]);
-    if (requestDev[i] !== NO_DEVIATION) out.push(["pulses of the request within ", us(requestDev[i]) + " µs"]);
-    if (answerDev[i] !== NO_DEVIATION) out.push(["of the answer within ", us(answerDev[i]) + " µs"]);
+    if (requestDev[i] !== NO_DEVIATION) out.push(["request pulses off by up to ", us(requestDev[i]) + " µs"]);
+    if (answerDev[i] !== NO_DEVIATION) out.push(["answer pulses by up to ", us(answerDev[i]) + " µs"]);
     if (flags[i] & REPEATED) out.push(["", "repetition"]);
     if (phase[i] !== NONE) out.push(["phase ", line.phase_names[phase[i]] || phase[i]]);
     return out;
   }
   function tell() {
     const i = pointed >= 0 ? pointed : chosen, place = byId("detail");
-    if (i < 0) return;
+    if (i < 0) {
+      place.textContent = IDLE;
+      delete place.dataset.telegram;
+      return;
+    }
     place.replaceChildren(...describe(i).flatMap(([name, value], k) => {
       const strong = document.createElement(k < 2 ? "b" : "span");
       strong.textContent = value;
