@@ -91,9 +91,10 @@
     return [g, width, height];
   }
 
-  function fitText(g, text, x, y, width) {  // as much of a text as fits, nothing when that is too little
-    if (width < 14) return;
-    if (g.measureText(text).width <= width) { g.fillText(text, x, y); return; }
+  function fitText(g, text, x, y, width, ...shorter) {  // as much of a text as fits, nothing when that is too little
+    if (width < 12) return;
+    const fits = [text, ...shorter].find((one) => g.measureText(one).width <= width);
+    if (fits !== undefined) { g.fillText(fits, x, y); return; }
     if (width < 40) return;
     while (text && g.measureText(text + "…").width > width) text = text.slice(0, -1);
     if (text) g.fillText(text + "…", x, y);
@@ -234,7 +235,7 @@
     const fill = ok ? colours["c-" + it.family] : colours.e15;
     block(g, "ask", x(time[i]), x(blockEnd), fill, it.word, 14, nsPerPx,
           (ok ? `${it.name} ${it.address || "all"}${it.bits ? " " + it.bits : ""}` : `bad request ${className(cls[i])}`) +
-          (flags[i] & REPEATED ? " repeated" : ""), flags[i] & REPEATED);
+          (flags[i] & REPEATED ? " repeated" : ""), flags[i] & REPEATED, ok ? [`${it.name} ${it.address || "all"}`, it.address || "all"] : []);
     if (!ok) { g.globalAlpha = 1; return; }
     if (answers(i)) {
       const t = time[i] + LAST_NS + delay[i], good = answer[i] !== NONE;
@@ -259,7 +260,7 @@
   }
 
   // one telegram in its lane: a block, with text where there is room, with its pulses where there is more
-  function block(g, lane, x0, x1, fill, value, bits, nsPerPx, text, striped) {
+  function block(g, lane, x0, x1, fill, value, bits, nsPerPx, text, striped, shorter = []) {
     const [y, height] = LANES[lane], width = Math.max(x1 - x0, 1), near = nsPerPx < 450;
     const top = near ? y + 2 : y + 14, tall = near ? 18 : height - 14;
     g.fillStyle = fill;
@@ -270,11 +271,11 @@
     }
     if (!near) {
       g.fillStyle = colours.card;
-      fitText(g, text, x0 + 3, top + tall / 2, width - 5);
+      fitText(g, text, x0 + 3, top + tall / 2, width - 5, ...shorter);
       return;
     }
     g.fillStyle = colours.card;
-    fitText(g, text, x0 + 4, top + tall / 2 + .5, width - 6);
+    fitText(g, text, x0 + 4, top + tall / 2 + .5, width - 6, ...shorter);
     if (value === null || value === undefined) return;
     const word = telegramWord(value), middle = y + 41, swing = 15;
     g.strokeStyle = fill;
