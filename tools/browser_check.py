@@ -4,8 +4,8 @@
 
 usage: browser_check.py REPORT.html [--screenshots FOLDER]
 Checks: nothing on the console, no network, the numbers in the page are those of the data in it (and of report.json
-beside it), zooming, panning, error jumps, address search and sorting work by keyboard, wheel, drag and touch, nothing is
-wider than a narrow window. Prints one line per check; exit 1 when one fails.
+beside it), zooming, panning, error jumps, address search and sorting work by keyboard, wheel, drag and touch, nothing
+is wider than a narrow window. Prints one line per check; exit 1 when one fails.
 """
 import argparse
 import base64
@@ -98,8 +98,8 @@ class Browser:
 
     def settle(self) -> None:
         """Until what was asked for is drawn."""
-        self._call("POST", "/execute/async", {"script": "requestAnimationFrame(() => requestAnimationFrame(arguments[0]))",
-                                              "args": []})
+        self._call("POST", "/execute/async", {
+            "script": "requestAnimationFrame(() => requestAnimationFrame(arguments[0]))", "args": []})
 
     def devtools(self, command: str, **params):
         return self._call("POST", "/goog/cdp/execute", {"cmd": command, "params": params})
@@ -127,7 +127,8 @@ class Browser:
         self.settle()
 
     def size(self, width: int, height: int, touch: bool = False) -> None:
-        self.devtools("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=touch)
+        self.devtools("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1,
+                      mobile=touch)
         self.devtools("Emulation.setTouchEmulationEnabled", enabled=touch)
         self.settle()
 
@@ -274,7 +275,8 @@ def check_touch(browser: Browser) -> str:
 
 def check_sorting(browser: Browser) -> str:
     """A click on a head sorts by its exact values, a second one the other way round, and says so."""
-    column = ("const head = document.querySelector('#slaves th[data-key=requests]'); head.querySelector('button').click(); "
+    column = ("const head = document.querySelector('#slaves th[data-key=requests]'); "
+              "head.querySelector('button').click(); "
               "const k = head.cellIndex; return [head.getAttribute('aria-sort'), "
               "[...document.querySelectorAll('#slaves tbody tr')].map(r => +r.cells[k].dataset.v)]")
     down, values = browser.run(column)
@@ -289,7 +291,8 @@ def check_contrast(browser: Browser) -> str:
     """Text and its background differ by at least 4.5 to 1 (WCAG AA), light and dark."""
     script = """
       const rgb = (c) => c.match(/[\\d.]+/g).map(Number);
-      const light = (c) => { const [r, g, b] = c.slice(0, 3).map(v => (v /= 255) <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4);
+      const linear = v => (v /= 255) <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4;
+      const light = (c) => { const [r, g, b] = c.slice(0, 3).map(linear);
         return .2126 * r + .7152 * g + .0722 * b; };
       const out = [];
       for (const e of document.querySelectorAll('body *')) {
@@ -297,8 +300,10 @@ def check_contrast(browser: Browser) -> str:
             ![...e.childNodes].some(n => n.nodeType === 3 && n.textContent.trim())) continue;
         let back = e;
         while (back && (rgb(getComputedStyle(back).backgroundColor)[3] ?? 1) === 0) back = back.parentElement;
-        const a = light(rgb(getComputedStyle(e).color)), b = light(rgb(getComputedStyle(back || document.body).backgroundColor));
-        out.push([(Math.max(a, b) + .05) / (Math.min(a, b) + .05), e.tagName + ' ' + e.className + ' ' + e.textContent.slice(0, 30)]);
+        const a = light(rgb(getComputedStyle(e).color));
+        const b = light(rgb(getComputedStyle(back || document.body).backgroundColor));
+        out.push([(Math.max(a, b) + .05) / (Math.min(a, b) + .05),
+                  e.tagName + ' ' + e.className + ' ' + e.textContent.slice(0, 30)]);
       }
       return out.sort((a, b) => a[0] - b[0]).slice(0, 1)[0];"""
     worst = []
@@ -327,7 +332,8 @@ def check_page(browser: Browser, page: Path, report: dict) -> list[str]:
     browser.open(page)
     _true(browser.run("return document.documentElement.dataset.ready") == "1", "the script of the page did not finish")
     timing = browser.run("const n = performance.getEntriesByType('navigation')[0]; return n.loadEventEnd || n.duration")
-    lines = [f"loaded in {timing:.0f} ms ({time.monotonic() - started:.1f} s with the driver), {page.stat().st_size} bytes",
+    lines = [f"loaded in {timing:.0f} ms ({time.monotonic() - started:.1f} s with the driver), "
+             f"{page.stat().st_size} bytes",
              check_numbers(browser, report), check_time_line(browser), check_touch(browser), check_sorting(browser),
              check_contrast(browser)]
     return [*lines, check_quiet(browser)]

@@ -125,7 +125,8 @@ def test_page_holds_and_shows_the_report(packaging):
 def test_time_line_has_the_telegrams_of_the_log(packaging):
     """PL-005: one row per line of telegrams.jsonl, the same call, address, data, answer, delay, class and phase."""
     data = Page((packaging / "report.html").read_text()).data()
-    line, records = data["timeline"], [json.loads(text) for text in (packaging / "telegrams.jsonl").read_text().splitlines()]
+    line = data["timeline"]
+    records = [json.loads(text) for text in (packaging / "telegrams.jsonl").read_text().splitlines()]
     assert line["total"] == line["shown"] == len(records) > 1000 and line["every"] == 1
     for row, record in zip(rows(data), records, strict=True):
         t_ns, delay, _, _, call, error, answer, phase, flags = row
@@ -154,8 +155,8 @@ def test_row_counts_answers_classes_delays(packaging):
 
 def test_cycle_histogram_counts_every_cycle():
     """PL-005: bars add up to the cycles; their times are those from one DEXG of the lowest number to the next."""
-    calls = [telegram(5_000_000 * cycle + 200_000 * k + 10_000 * (cycle % 3) * (k == 0), encode_call("DEXG", k + 1), data=1)
-             for cycle in range(40) for k in range(3)]
+    calls = [telegram(5_000_000 * cycle + 200_000 * k + 10_000 * (cycle % 3) * (k == 0),
+                      encode_call("DEXG", k + 1), data=1) for cycle in range(40) for k in range(3)]
     out = traced(calls)
     starts = [one.t_ns for one in calls if one.call >> 5 & 31 == 1]
     periods = [b - a for a, b in zip(starts, starts[1:])]
@@ -264,7 +265,8 @@ def test_long_recordings_keep_what_matters():
     there = set(times)
     for number, one in enumerate(line):
         name = "DEXG" if not one.call >> 10 and not one.call & 16 else "?"
-        plain = not one.repeated and (one.error_class == ErrorClass.NO_RESPONSE or name == "DEXG" and not one.error_class)
+        good = name == "DEXG" and not one.error_class
+        plain = not one.repeated and (good or one.error_class == ErrorClass.NO_RESPONSE)
         if not plain:
             around = line[max(0, number - trace.CONTEXT):number + trace.CONTEXT + 1]
             assert {other.t_ns for other in around} <= there, number
@@ -277,7 +279,7 @@ def test_long_recordings_keep_what_matters():
 
 
 def test_errors_stay_whatever_their_number():
-    """PL-007: when errors alone exceed the limit they all stay; the neighbours go and the note does not promise them."""
+    """PL-007: when errors alone exceed the limit they all stay; the neighbours go, the note does not promise them."""
     line = list(long_line(400, {cycle: ErrorClass.PARITY for cycle in range(400)}))
     out = traced(line, limit=300)
     assert sum(row[5] == ErrorClass.PARITY for row in rows({"timeline": out.data()})) == 400
@@ -320,12 +322,13 @@ def test_slaves_that_come_and_go():
 
 
 def test_phases_of_the_time_line():
-    """PL-010: phases run from their first to their last telegram; the three of a cycle are one; silence ends a phase."""
+    """PL-010: phases run from their first to their last telegram; the three of a cycle are one; silence ends one."""
     line = [telegram(t * 1_000_000, encode_call("RDIO", 5), data=1, phase=phase) for t, phase in (
-        (1, Phase.DETECTION), (2, Phase.DETECTION), (3, Phase.ACTIVATION), (4, Phase.DATA_EXCHANGE), (5, Phase.INCLUSION),
-        (6, Phase.DATA_EXCHANGE), (30, Phase.DATA_EXCHANGE))]
+        (1, Phase.DETECTION), (2, Phase.DETECTION), (3, Phase.ACTIVATION), (4, Phase.DATA_EXCHANGE),
+        (5, Phase.INCLUSION), (6, Phase.DATA_EXCHANGE), (30, Phase.DATA_EXCHANGE))]
     out = traced(line)
-    assert out.phases == [[1e6, 2e6, "DETECTION"], [3e6, 3e6, "ACTIVATION"], [4e6, 6e6, "CYCLES"], [30e6, 30e6, "CYCLES"]]
+    assert out.phases == [[1e6, 2e6, "DETECTION"], [3e6, 3e6, "ACTIVATION"], [4e6, 6e6, "CYCLES"],
+                          [30e6, 30e6, "CYCLES"]]
     assert [(t, what) for t, kind, what in out.events if kind == "phase"] == [
         (1e6, "DETECTION"), (3e6, "ACTIVATION"), (4e6, "CYCLES"), (30e6, "CYCLES")]
 
@@ -393,7 +396,7 @@ def capture(path, form, shift=0):
 
 @pytest.mark.parametrize("form", ["volts", "levels"])
 def test_eye_of_a_capture(tmp_path, form):
-    """PL-009, PL-005: decode --html: starts and ends lie where the capture has them, volts are there for analog ones."""
+    """PL-009, PL-005: decode --html: starts and ends lie where the capture has them, volts are there if analog."""
     capture(tmp_path / "line.csv", form, shift=500)
     done = CliRunner().invoke(cli.app, ["decode", str(tmp_path / "line.csv"), "--html", str(tmp_path / "line.html"),
                                         "--stats", str(tmp_path / "line.json"), "--format", "none"])

@@ -167,7 +167,8 @@ def run(
             console.print(f"note: the line stays quiet until {report.ms(settle_ns)}, the wait after power-up")
         wave_path = out / "waves.part" if waves else None
         image = firmware or FIRMWARE / ("asi_test.hex" if quick else "asi.hex")
-        files = ["report.json", *(["report.html"] if html else []), *(["telegrams.log", "telegrams.jsonl"] if log else [])]
+        files = ["report.json", *(["report.html"] if html else []),
+                 *(["telegrams.log", "telegrams.jsonl"] if log else [])]
         try:
             bench = open_bench(image, wave_path, described.seed)
         except BenchError as error:

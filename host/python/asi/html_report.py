@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report as one HTML file that needs nothing else: page.html, page.css and page.js of asi/html with the data in them.
+"""The report as one HTML file that needs nothing else: page.html, page.css, page.js of asi/html, and the data in them.
 
 Numbers, tables and diagrams are made here, so they are there without a script and on paper; the script adds the time
 line, sorting and jumps. Every text is untrusted (plant names, file names) and escaped; a content security policy allows
@@ -56,7 +56,8 @@ def _at(report: dict[str, Any], path: str) -> Any:
 def _value(report: dict[str, Any], path: str, show: Callable[[Any], str] = _number) -> str:
     """One number of the report, shown and exact."""
     value = _at(report, path)
-    return f'<span class="n" data-path="{escape(path)}" data-v="{escape(json.dumps(value))}">{escape(show(value))}</span>'
+    return (f'<span class="n" data-path="{escape(path)}" data-v="{escape(json.dumps(value))}">'
+            f'{escape(show(value))}</span>')
 
 
 def _tile(name: str, content: str, small: str = "") -> str:
@@ -120,7 +121,8 @@ def _slaves(rows: Sequence[dict[str, Any]], trace: Trace, of_run: bool) -> str:
     columns = _columns(shown, trace, of_run)
     head = ('<th scope="col" data-key="address" aria-sort="ascending"><button type="button">Address</button></th>'
             + "".join(f'<th scope="col" data-key="{escape(c.key)}" class="{"num" if c.numeric else ""}" '
-                      f'title="{escape(c.hint)}"><button type="button">{escape(c.title)}</button></th>' for c in columns))
+                      f'title="{escape(c.hint)}"><button type="button">{escape(c.title)}</button></th>'
+                      for c in columns))
     body = []
     for order, row in enumerate(shown):
         index = "" if row["index"] is None else row["index"]
@@ -129,11 +131,12 @@ def _slaves(rows: Sequence[dict[str, Any]], trace: Trace, of_run: bool) -> str:
             f'{escape(row["address"])}</button>' if row["address"] else "other") + "</th>"]
         for c in columns:
             value = c.value(row)
-            bad = row["address"] is not None and c.numeric and bool(value) and (c.key == "failed" or c.key.startswith("by_class."))
+            bad = row["address"] is not None and bool(value) and c.key.startswith(("failed", "by_class."))
             if c.key == "lists":
                 bad = row["lps"] != row["las"] or (row["index"] == 0 and row["lds"])
-            cells.append(f'<td data-key="{escape(c.key)}" data-v="{escape(json.dumps(value) if c.numeric else str(value or ""))}"'
-                         f' class="{"num " * c.numeric}{"bad" * bad}">{escape(c.show(value))}</td>')
+            exact = json.dumps(value) if c.numeric else str(value or "")
+            cells.append(f'<td data-key="{escape(c.key)}" data-v="{escape(exact)}" '
+                         f'class="{"num " * c.numeric}{"bad" * bad}">{escape(c.show(value))}</td>')
         body.append(f'<tr data-index="{index}">{"".join(cells)}</tr>')
     return (f'<div class="scroll" tabindex="0" role="region" aria-label="Slaves"><table id="slaves" class="sort">'
             f'<thead><tr>{head}</tr></thead><tbody>{"".join(body)}</tbody></table></div>')
@@ -157,15 +160,19 @@ def _histogram(per_us: dict[int, int]) -> str:
         tall = max(2.0, (height - 14) * count / top)
         first = low + k * step
         text = f"{first} µs" if step == 1 else f"{first} to {first + step - 1} µs"
-        bars.append(f'<rect class="bar" x="{left + k * slot:.1f}" y="{height - tall:.1f}" width="{max(1, slot - 1):.1f}" '
+        bars.append(f'<rect class="bar" x="{left + k * slot:.1f}" y="{height - tall:.1f}" '
+                    f'width="{max(1, slot - 1):.1f}" '
                     f'height="{tall:.1f}" data-us="{first}" data-count="{count}">'
                     f'<title>{text}: {_number(count)} cycles</title></rect>')
     ticks = sorted({0, number // 2, number - 1})
-    labels = "".join(f'<text x="{left + (k + .5) * slot:.1f}" y="{height + 16}" text-anchor="middle">{low + k * step}</text>'
+    labels = "".join(f'<text x="{left + (k + .5) * slot:.1f}" y="{height + 16}" '
+                     f'text-anchor="middle">{low + k * step}</text>'
                      for k in ticks if k in (0, number - 1) and (k == 0 or number * slot > 60) or number * slot > 160)
     total = sum(per_us.values())
-    return (f'<svg viewBox="0 0 {width + left + 24} {height + bottom + 8}" role="img" aria-label="Histogram of {total} cycle '
-            f'times from {low} to {high} microseconds"><line class="axis" x1="{left}" x2="{left + width}" y1="{height}" '
+    return (f'<svg viewBox="0 0 {width + left + 24} {height + bottom + 8}" role="img" aria-label="Histogram of '
+            f'{total} cycle '
+            f'times from {low} to {high} microseconds"><line class="axis" x1="{left}" x2="{left + width}" '
+            f'y1="{height}" '
             f'y2="{height}"/><text x="{left - 6}" y="22" text-anchor="end">{_number(top)}</text><text x="{left - 6}" '
             f'y="{height}" text-anchor="end">0</text>{"".join(bars)}{labels}<text x="{left + width}" y="{height + 32}" '
             f'text-anchor="end">cycle time, µs; bars of {step} µs</text></svg>')
@@ -183,7 +190,8 @@ def _eye_frame(height: int) -> str:
     out = []
     for grid in (0, HALF_BIT_NS):
         x0, x1 = _eye_x(grid - WIN_EARLY_NS), _eye_x(grid + WIN_LATE_NS)
-        out.append(f'<rect class="window" x="{x0:.1f}" y="0" width="{x1 - x0:.1f}" height="{height}"><title>receiver window '
+        out.append(f'<rect class="window" x="{x0:.1f}" y="0" width="{x1 - x0:.1f}" '
+                   f'height="{height}"><title>receiver window '
                    f'−{WIN_EARLY_NS / 1000:g}/+{WIN_LATE_NS / 1000:g} µs</title></rect>'
                    f'<line class="grid" x1="{_eye_x(grid):.1f}" x2="{_eye_x(grid):.1f}" y1="0" y2="{height}"/>')
     for us in range(-1, 6):
@@ -203,14 +211,15 @@ def _pulse_eye(starts: list[list[int]], ends: list[list[int]], title: str) -> st
     paths = []
     for name, bins in (("ends", ends), ("starts", starts)):
         for sign, counts in enumerate(bins):
-            path = "".join(
-                f"M{_EYE_LEFT + k * slot:.1f} {axis}v{(-1 if sign else 1) * max(4.0, half * math.log1p(count) / math.log1p(top)):.1f}"
-                f"h{slot:.1f}V{axis}z" for k, count in enumerate(counts) if count)
+            tall = [(-1 if sign else 1) * max(4.0, half * math.log1p(count) / math.log1p(top)) for count in counts]
+            path = "".join(f"M{_EYE_LEFT + k * slot:.1f} {axis}v{tall[k]:.1f}h{slot:.1f}V{axis}z"
+                           for k, count in enumerate(counts) if count)
             paths.append(f'<path class="{name}" d="{path}"/>')
     outside = sum(count for bins in starts for k, count in enumerate(bins) if not _in_window(k))
     return (f'<figure><figcaption>{escape(title)}: {_number(total)} pulses after the first of each telegram, '
             f'<b class="{"bad" if outside else ""}">{_number(outside)} begin outside the windows</b></figcaption>'
-            f'<svg viewBox="0 0 {_EYE_W + _EYE_LEFT + 24} 236" role="img" data-total="{total}" data-outside="{outside}" '
+            f'<svg viewBox="0 0 {_EYE_W + _EYE_LEFT + 24} 236" role="img" data-total="{total}" '
+            f'data-outside="{outside}" '
             f'aria-label="Eye of pulse starts and ends, {escape(title)}">{_eye_frame(2 * axis)}'
             f'<line class="axis" x1="{_EYE_LEFT}" x2="{_EYE_LEFT + _EYE_W}" y1="{axis}" y2="{axis}"/>{"".join(paths)}'
             f'<text x="{_EYE_LEFT - 8}" y="55" text-anchor="end">+</text><text x="{_EYE_LEFT - 8}" y="153" '
@@ -239,7 +248,8 @@ def _volt_eye(cells: dict[tuple[int, int], int], title: str) -> str:
     paths = "".join(f'<path class="volts v{level}" d="{"".join(path)}"/>' for level, path in enumerate(levels) if path)
     volts = reach * eye.VOLT
     return (f'<figure><figcaption>{escape(title)}: voltage, {_number(sum(cells.values()))} samples</figcaption>'
-            f'<svg viewBox="0 0 {_EYE_W + _EYE_LEFT + 24} {height + 36}" role="img" aria-label="Voltage eye, {escape(title)}">'
+            f'<svg viewBox="0 0 {_EYE_W + _EYE_LEFT + 24} {height + 36}" role="img" aria-label="Voltage eye, '
+            f'{escape(title)}">'
             f'{_eye_frame(height)}{paths}<text x="{_EYE_LEFT - 4}" y="11" text-anchor="end">{volts:+.1f}</text>'
             f'<text x="{_EYE_LEFT - 4}" y="{height / 2 + 4}" text-anchor="end">0 V</text><text x="{_EYE_LEFT - 4}" '
             f'y="{height}" text-anchor="end">−{volts:.1f}</text><text x="{_EYE_LEFT + _EYE_W}" y="{height + 32}" '
@@ -252,7 +262,8 @@ def _eyes(counts: dict[str, Any], volts: Sequence[dict] = ({}, {})) -> str:
     if not any(parts):
         return '<p class="none">No pulses were counted.</p>'
     ends = "" if any(map(any, counts["ends"][0] + counts["ends"][1])) else " The ends of the pulses are not known here."
-    return (f'<p class="hint">One bit time; 0 is the grid point of the first pulse, bit pulses belong to 0, half-bit pulses '
+    return (f'<p class="hint">One bit time; 0 is the grid point of the first pulse, bit pulses belong to 0, '
+            f'half-bit pulses '
             f'to 3 µs. <span class="key starts"></span> starts <span class="key ends"></span> ends <span '
             f'class="key window"></span> receiver window.{ends}</p><div class="figures">{"".join(parts)}</div>')
 
@@ -266,7 +277,8 @@ def _checks(checks: Sequence[dict[str, Any]]) -> str:
     for number, check in enumerate(checks):
         mark, style = marks[check["result"]]
         notes = "".join(f"<br>{escape(text)}" for text in check["differences"])
-        rows.append(f'<li class="{style}" data-path="checks.{number}.result" data-v="{escape(json.dumps(check["result"]))}">'
+        exact = escape(json.dumps(check["result"]))
+        rows.append(f'<li class="{style}" data-path="checks.{number}.result" data-v="{exact}">'
                     f'<b aria-hidden="true">{mark}</b> <span>{escape(check["name"])} at {_ms(check["at_ns"])} ms: '
                     f'{escape(check["result"])}{notes}</span></li>')
     return f'<ul class="checks">{"".join(rows)}</ul>'
@@ -290,13 +302,15 @@ def _flags(report: dict[str, Any]) -> str:
     out = []
     for name, on in report["state"]["flags"].items():
         bad = name in _GOOD_FLAGS and _GOOD_FLAGS[name] != on
-        out.append(f'<span class="flag {"bad" if bad else "good" if on else "dim"}" data-path="state.flags.{escape(name)}" '
+        out.append(f'<span class="flag {"bad" if bad else "good" if on else "dim"}" '
+                   f'data-path="state.flags.{escape(name)}" '
                    f'data-v="{json.dumps(on)}">{escape(name)} {int(on)}</span>')
     return f'<p class="flags">{"".join(out)}</p>'
 
 
 def _pairs(rows: Sequence[tuple[str, str]]) -> str:
-    return "<dl class=\"pairs\">" + "".join(f"<dt>{escape(name)}</dt><dd>{content}</dd>" for name, content in rows) + "</dl>"
+    items = "".join(f"<dt>{escape(name)}</dt><dd>{content}</dd>" for name, content in rows)
+    return f'<dl class="pairs">{items}</dl>'
 
 
 def _counts(report: dict[str, Any], path: str) -> str:
@@ -315,15 +329,19 @@ def of_run(report: dict[str, Any], trace: Trace, pulse_counts: dict[str, Any]) -
     met = sum(check["result"] == "met" for check in checks)
     style = {"ok": "good", "interrupted": "warn"}.get(report["result"], "bad")
     tiles = [
-        _tile("Bus time", f"{v('run.bus_time_ns', _ms)} ms", f"of {v('run.wanted_ns', _ms)} ms; {v('run.clocks')} clocks at "
+        _tile("Bus time", f"{v('run.bus_time_ns', _ms)} ms", f"of {v('run.wanted_ns', _ms)} ms; {v('run.clocks')} "
+                                                             f"clocks at "
               f"{v('run.clk_hz', lambda x: f'{x / 1e6:g}')} MHz"),
-        _tile("Cycle mean", f"{v('cycles.mean_ns', _us)} µs", f"min {v('cycles.min_ns', _us)}, max {v('cycles.max_ns', _us)}; "
+        _tile("Cycle mean", f"{v('cycles.mean_ns', _us)} µs", f"min {v('cycles.min_ns', _us)}, max "
+                                                              f"{v('cycles.max_ns', _us)}; "
               f"{v('cycles.count')} cycles"),
-        _tile("Requests", v("telegrams.requests"), f"{v('telegrams.repeated')} repeated, {v('telegrams.failed')} without a "
+        _tile("Requests", v("telegrams.requests"), f"{v('telegrams.repeated')} repeated, {v('telegrams.failed')} "
+                                                   f"without a "
               f"valid answer, {v('telegrams.bad_requests')} bad"),
         _tile("Slaves active", f'<span class="n">{len(report["state"]["las"])}</span>',
               f'{len(report["state"]["lds"])} detected, {len(report["state"]["lps"])} projected'),
-        _tile("Start-up", f"{v('start.start_up_ns', _ms)} ms", f"first telegram at {v('start.first_telegram_ns', _ms)} ms"),
+        _tile("Start-up", f"{v('start.start_up_ns', _ms)} ms",
+              f"first telegram at {v('start.first_telegram_ns', _ms)} ms"),
         _tile("Checks met", f'<span class="n" id="met">{met}</span> of {len(checks)}',
               f'{sum(c["result"] == "not met" for c in checks)} not met, '
               f'{sum(c["result"] == "not reached" for c in checks)} not reached'),
@@ -333,12 +351,13 @@ def of_run(report: dict[str, Any], trace: Trace, pulse_counts: dict[str, Any]) -
         ("Phase at the end", v("state.phase", str)),
         *((name.upper(), escape(" ".join(report["state"][name])) or "none") for name in LISTS),
         ("Calls", _counts(report, "telegrams.by_call")), ("Answers", _counts(report, "telegrams.by_class")),
-        ("Phases, ms", ", ".join(f"{escape(name)} {v(f'phases_ns.{name}', _ms)}" for name, t in report["phases_ns"].items()
-                                 if t) or "none"),
+        ("Phases, ms", ", ".join(f"{escape(name)} {v(f'phases_ns.{name}', _ms)}"
+                                 for name, t in report["phases_ns"].items() if t) or "none"),
         ("Master's counts", _counts(report, "master")),
         ("Core", f"{v('core.interrupts')} times awake, longest {v('core.longest_busy_clocks')} clocks, "
                  f"{v('core.longest_busy_in_cycle_clocks')} while cycles run"),
-        ("Simulation", f"{v('run.wall_s', lambda x: f'{x:.1f}')} s, {v('run.real_time_ratio', lambda x: f'{x}')} of real time; "
+        ("Simulation", f"{v('run.wall_s', lambda x: f'{x:.1f}')} s, {v('run.real_time_ratio', lambda x: f'{x}')} of "
+                       f"real time; "
                        f"seed {v('plant.seed', str)}"),
     ])
     head = (f'<h1>{escape(report["plant"]["name"])} <span class="badge {style}" data-path="result" '
@@ -357,9 +376,11 @@ def of_capture(statistics: dict[str, Any], trace: Trace, collected: eye.Eye) -> 
     tiles = [
         _tile("Capture", f'<span class="n">{_ms(statistics["end_ns"] - statistics["begin_ns"])}</span> ms',
               f"{v('begin_ns', _ms)} to {v('end_ns', _ms)} ms"),
-        _tile("Cycle mean", f"{v('cycles.mean_ns', _us)} µs", f"min {v('cycles.min_ns', _us)}, max {v('cycles.max_ns', _us)}; "
+        _tile("Cycle mean", f"{v('cycles.mean_ns', _us)} µs", f"min {v('cycles.min_ns', _us)}, max "
+                                                              f"{v('cycles.max_ns', _us)}; "
               f"{v('cycles.count')} periods"),
-        _tile("Requests", v("telegrams.requests"), f"{v('telegrams.repeated')} repeated, {v('telegrams.failed')} without a "
+        _tile("Requests", v("telegrams.requests"), f"{v('telegrams.repeated')} repeated, {v('telegrams.failed')} "
+                                                   f"without a "
               f"valid answer, {v('telegrams.bad_requests')} bad"),
         _tile("Addresses called", f'<span class="n">{len(statistics["slaves"])}</span>',
               f'{sum(bool(row["answers"]) for row in statistics["slaves"])} answered'),
@@ -371,7 +392,8 @@ def of_capture(statistics: dict[str, Any], trace: Trace, collected: eye.Eye) -> 
         ("Calls", _counts(statistics, "telegrams.by_call")), ("Answers", _counts(statistics, "telegrams.by_class")),
     ])
     notes = "".join(f"<li>{escape(note)}</li>" for note in statistics["notes"])
-    head = f'<h1>{escape(name)} <span class="badge">capture</span></h1><p class="about">{escape(statistics["file"])}</p>'
+    head = (f'<h1>{escape(name)} <span class="badge">capture</span></h1>'
+            f'<p class="about">{escape(statistics["file"])}</p>')
     return _page(name, "capture", statistics, trace, head, tiles,
                  first=_section("Notes", f"<ul>{notes}</ul>") if notes else "",
                  slaves=_slaves(statistics["slaves"], trace, False),
@@ -386,9 +408,11 @@ def _page(title: str, kind: str, report: dict[str, Any], trace: Trace, head: str
     note = trace.note()
     times = trace.cycle_times
     return Template(page).substitute(
-        policy=f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'; base-uri 'none'; "
+        policy=f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'; "
+               f"base-uri 'none'; "
                "form-action 'none'",
-        title=escape(f"{title} – AS-i report"), style=style, script=script, head=head, tiles="".join(tiles), first=first,
+        title=escape(f"{title} – AS-i report"), style=style, script=script, head=head, tiles="".join(tiles),
+        first=first,
         note=f'<p class="hint" id="left-out">{escape(note)}</p>' if note else "",
         histogram=_histogram(times.per_us),
         cycles=f'{_number(times.count)} cycles, from one DEXG of the lowest number to the next' if times.count else "",

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the HTML report keeps of the telegrams of a run or a capture. Times in ns.
 
-Bounded: when there are more than LIMIT telegrams, plain ones (good DEXG calls, and unanswered probes) stay only in every
-2nd, 4th, 8th ... slice of SLICE_NS, so that what stays are whole cycles. Errors, repetitions, all other calls, and CONTEXT
-telegrams on both sides of each of these always stay; CONTEXT is given up when even that is more than LIMIT.
+Bounded: when there are more than LIMIT telegrams, plain ones (good DEXG calls, and unanswered probes) stay only in
+every 2nd, 4th, 8th ... slice of SLICE_NS, so that what stays are whole cycles. Errors, repetitions, all other calls,
+and CONTEXT telegrams on both sides of each of these always stay; CONTEXT is given up when even that is more than LIMIT.
 """
 import base64
 import struct
@@ -166,9 +166,12 @@ class Trace:
         parts = []
         if self.shown < self.total:
             near = f" and {self.context} telegrams on both sides of each" if self.context else ""
-            parts.append(f"Long recording: {self.shown} of {self.total} telegrams are in this page. Good DEXG calls and "
-                         f"unanswered probes were kept in every {_nth(self.every)} slice of {SLICE_NS // 10**6} ms; all "
-                         f"errors, repetitions and other calls{near} are there. Tables and histograms count everything.")
+            parts.append(f"Long recording: {self.shown} of {self.total} telegrams are in this page. Good DEXG calls "
+                         f"and "
+                         f"unanswered probes were kept in every {_nth(self.every)} slice of {SLICE_NS // 10**6} ms; "
+                         f"all "
+                         f"errors, repetitions and other calls{near} are there. Tables and histograms count "
+                         f"everything.")
         for kind, count in self.left_out.items():
             parts.append(f"{count} more events of the kind \"{kind}\" are not listed.")
         return " ".join(parts) or None

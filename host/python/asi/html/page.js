@@ -14,7 +14,8 @@
   const count = bytes.length / line.row_bytes;
   const time = new Float64Array(count), delay = new Int32Array(count), call = new Uint16Array(count);
   const requestDev = new Int16Array(count), answerDev = new Int16Array(count);
-  const cls = new Uint8Array(count), answer = new Uint8Array(count), phase = new Uint8Array(count), flags = new Uint8Array(count);
+  const cls = new Uint8Array(count), answer = new Uint8Array(count);
+  const phase = new Uint8Array(count), flags = new Uint8Array(count);
   for (let i = 0, at = 0; i < count; i++, at += line.row_bytes) {
     time[i] = view.getFloat64(at, true);
     delay[i] = view.getInt32(at + 8, true);
@@ -26,7 +27,8 @@
     phase[i] = bytes[at + 20];
     flags[i] = bytes[at + 21];
   }
-  const calls = line.calls.map(([name, address, index, bits, word]) => ({name, address, index, bits, word, family: family(name)}));
+  const calls = line.calls.map(([name, address, index, bits, word]) =>
+    ({name, address, index, bits, word, family: family(name)}));
   const run = data.report.run;
   const begin = run ? 0 : data.report.begin_ns;
   const end = Math.max(run ? run.bus_time_ns : data.report.end_ns, count ? time[count - 1] + 150000 : 0, begin + 1000);
@@ -167,7 +169,8 @@
     for (const [name, x0, x1] of names) fitText(g, name, x0 + 5, y + height / 2 + .5, x1 - x0 - 8);
   }
 
-  const MARKS = {check: "good", slave: "c-read", phase: "dim", world: "e4", host: "accent", input: "c-answer", output: "c-dexg"};
+  const MARKS = {check: "good", slave: "c-read", phase: "dim", world: "e4", host: "accent",
+                 input: "c-answer", output: "c-dexg"};
   function drawEvents(g, x) {
     const [y, height] = LANES.marks;
     let last = -9, kind = "";
@@ -228,14 +231,14 @@
   }
 
   function drawTelegram(g, x, i, nsPerPx) {
-    const it = calls[call[i]], ok = (flags[i] & REQUEST_OK) !== 0;
+    const it = calls[call[i]], ok = (flags[i] & REQUEST_OK) !== 0, who = `${it.name} ${it.address || "all"}`;
     g.globalAlpha = wanted(i) ? 1 : .18;
     const next = i + 1 < count ? time[i + 1] : Infinity;
     const blockEnd = Math.min(time[i] + REQUEST_NS, next);
     const fill = ok ? colours["c-" + it.family] : colours.e15;
     block(g, "ask", x(time[i]), x(blockEnd), fill, it.word, 14, nsPerPx,
-          (ok ? `${it.name} ${it.address || "all"}${it.bits ? " " + it.bits : ""}` : `bad request ${className(cls[i])}`) +
-          (flags[i] & REPEATED ? " repeated" : ""), flags[i] & REPEATED, ok ? [`${it.name} ${it.address || "all"}`, it.address || "all"] : []);
+          (ok ? who + (it.bits ? " " + it.bits : "") : `bad request ${className(cls[i])}`) +
+          (flags[i] & REPEATED ? " repeated" : ""), flags[i] & REPEATED, ok ? [who, it.address || "all"] : []);
     if (!ok) { g.globalAlpha = 1; return; }
     if (answers(i)) {
       const t = time[i] + LAST_NS + delay[i], good = answer[i] !== NONE;
@@ -284,8 +287,9 @@
     g.moveTo(at, middle);
     const pulse = (k, sign) => {
       const p0 = x0 + k * HALF_NS / nsPerPx, p1 = p0 + PULSE_NS / nsPerPx;
+      const bow = (p1 - p0) * .35, top = middle - sign * swing * 1.3;
       g.lineTo(p0, middle);
-      g.bezierCurveTo(p0 + (p1 - p0) * .35, middle - sign * swing * 1.3, p1 - (p1 - p0) * .35, middle - sign * swing * 1.3, p1, middle);
+      g.bezierCurveTo(p0 + bow, top, p1 - bow, top, p1, middle);
     };
     for (let k = 0; k < bits; k++) {
       const bit = word >> (bits - 1 - k) & 1, after = k + 1 < bits ? word >> (bits - 2 - k) & 1 : -1;
@@ -347,7 +351,8 @@
     for (let k = 0; k < columns; k++) if (bad[k]) g.fillRect(k - .5, 8, 2, 8);
     const x0 = (from - begin) * scale, w = Math.max(4, (to - from) * scale);
     g.fillStyle = colours.accent; g.globalAlpha = .16; g.fillRect(x0, 0, w, height);
-    g.globalAlpha = 1; g.strokeStyle = colours.accent; g.lineWidth = 2; g.strokeRect(x0 + 1, 1, w - 2, height - 2); g.lineWidth = 1;
+    g.globalAlpha = 1; g.strokeStyle = colours.accent; g.lineWidth = 2;
+    g.strokeRect(x0 + 1, 1, w - 2, height - 2); g.lineWidth = 1;
   }
 
   // ---------------------------------------------------------------- one telegram in words
@@ -412,7 +417,8 @@
       if (i <= chosen) at = number;
     }
     const here = chosen >= 0 && isError(chosen) && wanted(chosen);
-    byId("counter").textContent = `${here ? at + " of " : ""}${number} error${number === 1 ? "" : "s"}${note ? ", " + note : ""}`;
+    byId("counter").textContent = (here ? `${at} of ` : "") + `${number} error${number === 1 ? "" : "s"}` +
+      (note ? ", " + note : "");
     byId("counter").dataset.errors = number;
   }
 
@@ -429,7 +435,8 @@
   function telegramAt(event) {
     const t = timeAt(event), slack = (to - from) / wide * 3;
     if (slack > 600000) return -1;
-    const hit = (i) => i >= 0 && i < count && wanted(i) && time[i] - slack <= t && t <= Math.max(endOf(i), time[i] + 144000) + slack;
+    const hit = (i) => i >= 0 && i < count && wanted(i) && time[i] - slack <= t &&
+      t <= Math.max(endOf(i), time[i] + 144000) + slack;
     const i = firstFrom(t) - 1;
     return hit(i) ? i : hit(i + 1) ? i + 1 : -1;
   }
@@ -495,7 +502,9 @@
     "+": () => zoom(.5), "=": () => zoom(.5), "-": () => zoom(2), ArrowLeft: () => pan(-.2), ArrowRight: () => pan(.2),
     PageUp: () => pan(-1), PageDown: () => pan(1), Home: whole, n: () => stepError(1), p: () => stepError(-1),
     ".": () => stepAny(1), ",": () => stepAny(-1), Escape: () => choose(-1),
-    Enter: () => { if (chosen >= 0) show(time[chosen] - 30000, Math.max(endOf(chosen), time[chosen] + 150000) + 30000); },
+    Enter: () => {
+      if (chosen >= 0) show(time[chosen] - 30000, Math.max(endOf(chosen), time[chosen] + 150000) + 30000);
+    },
   };
   chart.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey || !KEYS[event.key]) return;
@@ -520,7 +529,8 @@
     const name = (data.report.slaves.find((slave) => slave.index === index) || {}).name;
     byId("address").add(new Option(name ? `${seen.get(index)}  ${name}` : seen.get(index), String(index)));
   }
-  byId("address").addEventListener("change", (event) => setFilter(event.target.value === "" ? null : Number(event.target.value)));
+  byId("address").addEventListener("change", (event) =>
+    setFilter(event.target.value === "" ? null : Number(event.target.value)));
   for (const button of document.querySelectorAll("button.find")) {
     button.addEventListener("click", () => {
       if (!seen.has(Number(button.dataset.find))) return;
@@ -561,7 +571,10 @@
     const entries = [], add = (fill, text) => entries.push([fill, text]);
     const names = new Set(calls.map((it) => it.family)), failed = new Set();
     let probe = false;
-    for (let i = 0; i < count; i++) if (fails(i)) failed.add(flags[i] & REQUEST_OK ? cls[i] : 15); else probe ||= isProbe(i);
+    for (let i = 0; i < count; i++) {
+      if (fails(i)) failed.add(flags[i] & REQUEST_OK ? cls[i] : 15);
+      else probe ||= isProbe(i);
+    }
     const titles = {dexg: "DEXG", par: "WPAR", read: "read calls", addr: "addressing", other: "other calls"};
     for (const name of FAMILIES) if (names.has(name)) add("c-" + name, titles[name]);
     add("c-answer", "good answer");
