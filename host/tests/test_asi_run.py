@@ -375,7 +375,8 @@ def test_exit_0(asi, tmp_path):
     assert code == 0 and err == ""
     assert "expect at 520.000 ms: met" in out and "\x1b" not in out
     assert [line for line in out.splitlines() if re.fullmatch(r"\d+ of 520 ms  \d+ cycles  [\d.]+ x real time", line)]
-    assert sorted(p.name for p in (tmp_path / "run").iterdir()) == ["report.json", "telegrams.jsonl", "telegrams.log"]
+    assert sorted(p.name for p in (tmp_path / "run").iterdir()) == [
+        "report.html", "report.json", "telegrams.jsonl", "telegrams.log"]
     assert asi.made == [(Path("build/firmware/asi_test.hex"), None, 7)] and asi.bench.closed
 
 
@@ -430,7 +431,7 @@ def test_options(asi, tmp_path):
     code, out, _ = asi("run", written(tmp_path), "--time", "60ms", "--seed", "99", "--waves", "--no-log",
                        "--firmware", "x.hex", "--settle", "20ms")
     assert code == 0 and asi.made == [(Path("x.hex"), tmp_path / "run/waves.part", 99)]
-    assert sorted(p.name for p in (tmp_path / "run").iterdir()) == ["report.json", "waves.vcd"]
+    assert sorted(p.name for p in (tmp_path / "run").iterdir()) == ["report.html", "report.json", "waves.vcd"]
     result = json.loads((tmp_path / "run/report.json").read_text())
     assert result["plant"]["seed"] == 99 and result["run"]["wanted_ns"] == 60_000_000
     assert result["checks"][0]["result"] == "not reached"
