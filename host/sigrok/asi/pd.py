@@ -9,7 +9,7 @@ from collections import deque
 
 import sigrokdecode as srd
 
-from asi.capture import FILTER_NS, LOWEST_RATE_HZ, Comparators, Manchester
+from asi.capture import FILTER_NS, LOWEST_RATE_HZ, Comparators, Manchester, Sink
 from asi.checks import ANSWER_BITS, HALF_BIT_NS, REQUEST_BITS, WIN_LATE_NS, bit_values, end_ns
 from asi.decode import Decoder as Telegrams
 from asi.decode import Extended
@@ -122,10 +122,10 @@ class Decoder(srd.Decoder):
         self._sink_pulse = sink.pulse
         filter_ns = max(0.0, FILTER_NS - 1e9 / self.samplerate)  # a pulse may look one sample shorter than it is
         if kind == "pulses":
-            front = Comparators(self._pulse, filter_ns, invert)
+            front = Comparators(Sink(self._pulse), filter_ns, invert)
             edges = [{P: "e"}, {N: "e"}]
         else:
-            front = Manchester(self._pulse, filter_ns, invert)
+            front = Manchester(Sink(self._pulse), filter_ns, invert)
             edges = [{MAN: "e"}]
         self._run(kind, front, edges, filter_ns)
 
