@@ -1,30 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
 // asi_line_guard: power fail and earth fault of the line. A state of the power input below ApfDipNs is ignored in
 // both directions, because telegrams ride on the supply; then the set and clear times differ.
-// apf_o after reset: 1 until the line was good for ApfOkNs. Times hold within one tick.
-// Requirements: LT-010 (docs/requirements.md).
+// apf_o after reset: 1 until the line was good for ApfOkNs. efault_o follows its input when that was the same for EfNs
+// without a break, 0 after reset. Times hold within one tick.
+// Requirements: LT-010, LT-016 (docs/requirements.md).
 module asi_line_guard #(
   parameter int unsigned ApfOnNs  = asi_timing_pkg::ApfOnNs,
   parameter int unsigned ApfOkNs  = asi_timing_pkg::ApfOkNs,
-  parameter int unsigned ApfDipNs = asi_timing_pkg::ApfDipNs
+  parameter int unsigned ApfDipNs = asi_timing_pkg::ApfDipNs,
+  parameter int unsigned EfNs     = asi_timing_pkg::EfNs
 ) (
   input  logic clk_i, rst_i,      // rst_i: synchronous, active high
   input  logic tick_i,            // one clock per microsecond
   input  logic apf_ni, efault_i,  // pins: low = line voltage too low; high = earth fault
-  output logic apf_o, efault_o    // filtered power fail; earth fault, synchronised only
+  output logic apf_o, efault_o    // filtered: power fail, earth fault
 );
   // One tick more than the time in us: the first tick comes somewhere in the first microsecond.
   localparam int unsigned DipTicks = ApfDipNs / 1000 + 1;
   localparam int unsigned OnTicks  = ApfOnNs  / 1000 + 1 - DipTicks;
   localparam int unsigned OkTicks  = ApfOkNs  / 1000 + 1 - DipTicks;
   localparam int unsigned DipW     = $clog2(DipTicks);
+  localparam int unsigned EfTicks  = EfNs     / 1000 + 1;
+  localparam int unsigned EfW      = $clog2(EfTicks);
+  // The earth fault count starts so that its overflow is the end of the time: no comparator over its 20 bits.
+  localparam logic [EfW:0] EfStart = (EfW + 1)'((1 << EfW) - EfTicks);
   localparam int unsigned CntW     = $clog2((OkTicks > OnTicks ? OkTicks : OnTicks) + 1);
   logic            good, good_d, good_q;  // good_q: without dips
   logic [DipW-1:0] dip_d, dip_q;          // ticks in which the pin disagreed with good_q
   logic [CntW-1:0] cnt_d, cnt_q;          // ticks in which good_q disagreed with apf_o
   logic            apf_d;
+  logic            earth;                 // the pin
+  logic [EfW:0]    ef_d, ef_q;            // ticks in which the pin disagreed with efault_o; top bit: long enough
 
-  asi_sync #(.Width(2)) i_sync (.clk_i, .rst_i, .async_i({apf_ni, efault_i}), .sync_o({good, efault_o}));
+  asi_sync #(.Width(2)) i_sync (.clk_i, .rst_i, .async_i({apf_ni, efault_i}), .sync_o({good, earth}));
 
   always_comb begin
     good_d = good_q;  dip_d = dip_q;  cnt_d = cnt_q;  apf_d = apf_o;
@@ -40,6 +48,7 @@ module asi_line_guard #(
         apf_d = !apf_o;  cnt_d = '0;
       end
     end
+    ef_d = (earth == efault_o || ef_q[EfW]) ? EfStart : tick_i ? ef_q + 1'b1 : ef_q;
   end
 
   always_ff @(posedge clk_i) begin
@@ -47,10 +56,12 @@ module asi_line_guard #(
     dip_q  <= rst_i ? '0   : dip_d;
     cnt_q  <= rst_i ? '0   : cnt_d;
     apf_o  <= rst_i ? 1'b1 : apf_d;
+    ef_q     <= rst_i ? EfStart : ef_d;
+    efault_o <= rst_i ? 1'b0    : efault_o ^ ef_d[EfW];
   end
 
 `ifndef SYNTHESIS
-  initial Times_A: assert (ApfOnNs > ApfDipNs && ApfOkNs > ApfDipNs);
+  initial Times_A: assert (ApfOnNs > ApfDipNs && ApfOkNs > ApfDipNs && EfNs >= 1_000);
   always_ff @(posedge clk_i) if (!rst_i) begin
     Change_A: assert (apf_d == apf_o || (tick_i && apf_d != good_q));
     Fail_C:   cover (!apf_o && apf_d);

@@ -20,7 +20,7 @@ package asi_timing_pkg;
   localparam int unsigned ApfOnNs     = 1_000_000;   // P_APF_ON: power low this long -> APF
   localparam int unsigned ApfOkNs     = 10_000_000;  // P_APF_OK: power good this long -> no APF
   localparam int unsigned JabberNs    = 300_000;     // P_JABBER: a sender on for longer is cut off
-  localparam int unsigned PauseNs     = 7_500;       // P_PAUSE: no pulse for this long is a pause
+  localparam int unsigned PauseNs     = 8_375;       // P_PAUSE: longest gap in a telegram: 6 us, one early, one late
   localparam int unsigned VthClearNs  = 2_000;       // P_VTH_CLEAR: then the held amplitude is dropped for this long
   localparam int unsigned EfNs        = 1_000_000_000;  // P_EF: earth fault present or gone for this long
   localparam int unsigned ApfDipNs    = 6_000;       // states of the power input shorter than this are ignored
