@@ -23,14 +23,14 @@ module asi_line_guard #(
   localparam int unsigned EfTicks  = EfNs     / 1000 + 1;
   localparam int unsigned EfW      = $clog2(EfTicks);
   // The earth fault count starts so that its overflow is the end of the time: no comparator over its 20 bits.
-  localparam logic [EfW:0] EfStart = (EfW + 1)'((1 << EfW) - EfTicks);
+  localparam logic [EfW-1:0] EfStart = EfW'((1 << EfW) - EfTicks);
   localparam int unsigned CntW     = $clog2((OkTicks > OnTicks ? OkTicks : OnTicks) + 1);
   logic            good, good_d, good_q;  // good_q: without dips
   logic [DipW-1:0] dip_d, dip_q;          // ticks in which the pin disagreed with good_q
   logic [CntW-1:0] cnt_d, cnt_q;          // ticks in which good_q disagreed with apf_o
   logic            apf_d;
-  logic            earth;                 // the pin
-  logic [EfW:0]    ef_d, ef_q;            // ticks in which the pin disagreed with efault_o; top bit: long enough
+  logic            earth, ef_over;        // the pin; it disagreed with efault_o for long enough
+  logic [EfW-1:0]  ef_d, ef_q;            // ticks in which it did, from EfStart on
 
   asi_sync #(.Width(2)) i_sync (.clk_i, .rst_i, .async_i({apf_ni, efault_i}), .sync_o({good, earth}));
 
@@ -48,16 +48,17 @@ module asi_line_guard #(
         apf_d = !apf_o;  cnt_d = '0;
       end
     end
-    ef_d = (earth == efault_o || ef_q[EfW]) ? EfStart : tick_i ? ef_q + 1'b1 : ef_q;
+    {ef_over, ef_d} = {1'b0, ef_q} + (EfW + 1)'(tick_i);
+    if (earth == efault_o || ef_over) ef_d = EfStart;
   end
 
   always_ff @(posedge clk_i) begin
-    good_q <= rst_i ? 1'b0 : good_d;
-    dip_q  <= rst_i ? '0   : dip_d;
-    cnt_q  <= rst_i ? '0   : cnt_d;
-    apf_o  <= rst_i ? 1'b1 : apf_d;
+    good_q   <= rst_i ? 1'b0    : good_d;
+    dip_q    <= rst_i ? '0      : dip_d;
+    cnt_q    <= rst_i ? '0      : cnt_d;
     ef_q     <= rst_i ? EfStart : ef_d;
-    efault_o <= rst_i ? 1'b0    : efault_o ^ ef_d[EfW];
+    apf_o    <= rst_i ? 1'b1    : apf_d;
+    efault_o <= rst_i ? 1'b0    : ef_over ? earth : efault_o;
   end
 
 `ifndef SYNTHESIS
@@ -66,6 +67,8 @@ module asi_line_guard #(
     Change_A: assert (apf_d == apf_o || (tick_i && apf_d != good_q));
     Fail_C:   cover (!apf_o && apf_d);
     Clear_C:  cover (apf_o && !apf_d);
+    Earth_C:  cover (ef_over && earth && !efault_o);
+    Gone_C:   cover (ef_over && !earth && efault_o);
   end
 `endif
 endmodule
