@@ -9,6 +9,9 @@ phy/asi_pulse_filter.sv
 phy/asi_tx.sv
 phy/asi_rx.sv
 phy/asi_xact.sv
+phy/asi_tx_guard.sv
+phy/asi_tx_shape.sv
+phy/asi_vth.sv
 phy/asi_line_guard.sv
 link/asi_seq.sv
 generated/asi_regs.sv

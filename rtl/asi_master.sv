@@ -18,6 +18,10 @@ module asi_master #(
   parameter int unsigned TxBiasNs      = asi_timing_pkg::TxBiasNs,
   parameter int unsigned ApfOnNs       = asi_timing_pkg::ApfOnNs,
   parameter int unsigned ApfOkNs       = asi_timing_pkg::ApfOkNs,
+  parameter int unsigned EfNs          = asi_timing_pkg::EfNs,
+  parameter int unsigned JabberNs      = asi_timing_pkg::JabberNs,
+  parameter int unsigned VthClearNs    = asi_timing_pkg::VthClearNs,
+  parameter int unsigned TxBias        = 12,          // codes of tx_dac_o while tx_en_o is on, 0..63
   parameter int unsigned DexgRetry     = 1,           // P_DEXG_RETRY
   parameter int unsigned FailCycles    = 3            // P_FAIL_CYCLES
 ) (
@@ -25,6 +29,8 @@ module asi_master #(
   // line: comparators (asynchronous), Manchester level and bias, supply too low (low) and earth fault (high)
   input  logic        rx_p_i, rx_n_i,
   output logic        tx_man_o, tx_en_o,
+  output logic [7:0]  tx_dac_o,                       // current of a shaped sender, instead of the two above
+  output logic        rx_vth_clear_o,                 // drop the amplitude held for the threshold
   input  logic        apf_ni, efault_i,
   // flash, SPI mode 0
   output logic        spi_sck_o, spi_cs_no, spi_mosi_o,
@@ -80,6 +86,8 @@ module asi_master #(
   logic [1:0]  req_retries, res_repeats;
   logic [3:0]  res_data;
   asi_map_pkg::error_class_e res_last, res_first;
+  logic        man, man_en;                           // from asi_xact, before the jabber guard
+  logic        pulse_n, pulse_p;
 
   assign enable  = line_en & ~apf;
   assign phase_o = cycle_busy ? slot_phase : exec_phase;
@@ -107,16 +115,27 @@ module asi_master #(
     .res_valid_o(res_valid), .res_last_o(res_last), .res_first_o(res_first), .res_data_o(res_data),
     .res_repeats_o(res_repeats), .sent_o(sent), .repeat_o(is_repeat),
     .att_valid_o(), .att_index_o(), .att_class_o(), .att_repeat_o(), .att_final_o(), .att_delay_o(), .att_dev_o(),
-    .att_dev_late_o(), .pulse_n_o(), .pulse_p_o(),
-    .rx_p_i, .rx_n_i, .tx_man_o, .tx_en_o
+    .att_dev_late_o(), .pulse_n_o(pulse_n), .pulse_p_o(pulse_p),
+    .rx_p_i, .rx_n_i, .tx_man_o(man), .tx_en_o(man_en)
   );
 
-  asi_line_guard #(.ApfOnNs(ApfOnNs), .ApfOkNs(ApfOkNs)) u_guard (
+  asi_tx_guard #(.ClkHz(ClkHz), .JabberNs(JabberNs)) u_tx_guard (
+    .clk_i, .rst_i, .man_i(man), .en_i(man_en), .tx_man_o, .tx_en_o, .jabber_o(jabber)
+  );
+
+  asi_tx_shape #(.ClkHz(ClkHz), .TxBias(TxBias)) u_tx_shape (
+    .clk_i, .rst_i, .man_i(tx_man_o), .en_i(tx_en_o), .dac_o(tx_dac_o)
+  );
+
+  asi_vth #(.ClkHz(ClkHz), .VthClearNs(VthClearNs)) u_vth (
+    .clk_i, .rst_i, .n_start_i(pulse_n), .p_start_i(pulse_p), .rx_vth_clear_o
+  );
+
+  asi_line_guard #(.ApfOnNs(ApfOnNs), .ApfOkNs(ApfOkNs), .EfNs(EfNs)) u_guard (
     .clk_i, .rst_i, .tick_i(tick_us), .apf_ni, .efault_i, .apf_o(apf), .efault_o(efault)
   );
 
   logic unused_monitor;                               // until asi_monitor is here
-  assign jabber   = 1'b0;
   assign mon_head = mon_tail;
   assign mon_lost = '0;
   assign unused_monitor = mon_enable ^ mon_clear;

@@ -10,6 +10,8 @@ module top #(
   input  logic       clk_i, rst_ni,
   input  logic       rx_p_i, rx_n_i,
   output logic       tx_man_o, tx_en_o,
+  output logic [7:0] tx_dac_o,
+  output logic       rx_vth_clear_o,
   input  logic       apf_ni, efault_i,
   output logic       spi_sck_o, spi_cs_no, spi_mosi_o,
   input  logic       spi_miso_i,
@@ -41,7 +43,7 @@ module top #(
   asi_master #(
     .ClkHz(ClkHz), .BootFromFlash(BootFromFlash), .FirmwareHex(FirmwareHex), .BootRomHex(BootRomHex)
   ) u_master (
-    .clk_i, .rst_i(rst), .rx_p_i, .rx_n_i, .tx_man_o, .tx_en_o, .apf_ni, .efault_i,
+    .clk_i, .rst_i(rst), .rx_p_i, .rx_n_i, .tx_man_o, .tx_en_o, .tx_dac_o, .rx_vth_clear_o, .apf_ni, .efault_i,
     .spi_sck_o, .spi_cs_no, .spi_mosi_o, .spi_miso_i,
     .host_req_i(host_req), .host_we_i(host_we), .host_addr_i(host_addr), .host_be_i(host_be),
     .host_wdata_i(host_wdata), .host_rdata_o(host_rdata), .host_ready_o(host_ready), .host_irq_o,

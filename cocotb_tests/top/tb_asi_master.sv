@@ -15,6 +15,8 @@ module tb_asi_master #(
   logic [3:0]  host_be_i = '0;
   logic [31:0] host_wdata_i = '0, host_rdata_o;
   logic        tx_man_o, tx_en_o, spi_sck_o, spi_cs_no, spi_mosi_o, host_ready_o, host_irq_o, sync_o, core_wait_o;
+  logic [7:0]  tx_dac_o;
+  logic        rx_vth_clear_o;
   logic [2:0]  phase_o;
 
   initial begin
