@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Proof of asi_line_guard (LT-010, LT-016), unbounded, for any ticks and any behaviour of the pin. Times are counted in ticks
-// of one microsecond: n + 1 ticks span more than n us, n us span at least n ticks.
+// Proof of asi_line_guard (LT-010, LT-016), unbounded, for any ticks and any behaviour of the pins. Times are counted
+// in ticks of one microsecond: n + 1 ticks span more than n us, n us span at least n ticks.
 module asi_line_guard_fv (input logic clk_i, rst_i, tick_i, apf_ni, efault_i);
 `ifdef FV_COVER
   localparam int unsigned OnUs = 5, OkUs = 8, DipUs = 2, EfUs = 12;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Proof of asi_tx_shape (LT-015), unbounded, for any levels on the pins, also those no transmitter makes: the code never
-// jumps, rises only with the current or the bias, and ends at rest, bias and full scale. The table itself is compared
-// with the formula in simulation.
+// Proof of asi_tx_shape (LT-015), unbounded, for any levels on the pins, also those no transmitter makes: the code
+// never jumps, rises only with the current or the bias, and ends at rest, bias and full scale. The table itself is
+// compared with the formula in simulation.
 module asi_tx_shape_fv (input logic clk_i, rst_i, man_i, en_i);
   localparam int unsigned Steps = 24, Bias = 12, Largest = 21;  // at 8 MHz a step is a clock
   logic [7:0] dac;

@@ -18,13 +18,14 @@ module asi_vth_fv (input logic clk_i, rst_i, n_start_i, p_start_i);
     since_q   <= rst_i ? 8'(Pause + 1) : pulse ? 8'd1 : (since_q != '1) ? since_q + 1'b1 : since_q;
     if (live_q) begin
       Never_A:  assert (!clear || since_q > 8'(Pause));          // the last pulse is longer ago
-      // ... and no pulse that is on the pins already, seen or not, came within P_PAUSE: this strobe's gap is since_q
+      // ... and so is the one whose strobe is still to come: with a gap within P_PAUSE it has seen no clear
       Gap_A:    assert (!(pulse && since_q <= 8'(Pause)) || (!clear && !cleared_q));
       Always_A: assert (since_q <= 8'(Pause) || since_q > 8'(Pause + Clear) || clear);
       Once_A:   assert (since_q <= 8'(Pause + Clear) || !clear);
       // for the induction
       Count_A:  assert (dut.cnt_q == 7'(since_q > 8'(Pause + Clear) ? 8'(Pause + Clear) : since_q));
-      Since_A:  assert (since_q != '0 && (cleared_q || since_q <= 8'(Pause + 1)) && (!cleared_q || since_q > 8'(Pause)));
+      Since_A:  assert (since_q != '0 && (cleared_q || since_q <= 8'(Pause + 1)));
+      Past_A:   assert (!cleared_q || since_q > 8'(Pause));
     end
     Twice_C: cover (!rst_i && clear && since_q == 8'(Pause + Clear));
     Late_C:  cover (!rst_i && pulse && since_q == 8'(Pause));    // the longest gap of a legal telegram

@@ -34,7 +34,8 @@ PARTS = {
     },
 }
 # where a share of the cells is reported: top module -> needs the whole source list
-BLOCKS = ("asi_xact", "asi_seq", "asi_line_guard", "asi_core", "asi_regs", "asi_fabric", "asi_dpm", "asi_spi")
+BLOCKS = ("asi_xact", "asi_seq", "asi_tx_guard", "asi_tx_shape", "asi_vth", "asi_line_guard", "asi_core", "asi_regs",
+          "asi_fabric", "asi_dpm", "asi_spi")
 
 
 def run(command, log):

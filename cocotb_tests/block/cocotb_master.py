@@ -8,7 +8,8 @@ from cocotb_tests.block.cocotb_soc import LINK, TB, reg
 
 BATCH, SLOT, STATE = (LINK + getattr(regmap, f"LINK_{n}") for n in ("BATCH", "SLOT", "SLOT_STATE"))
 NO_RESPONSE, ABORTED = 1, 15
-BATCH_DONE, CYCLE_DONE, APF_CHANGE = 2, 1, 8
+BATCH_DONE, CYCLE_DONE, APF_CHANGE, EFAULT_CHANGE = 2, 1, 8, 64
+APF_LATCH, EFAULT_LATCH, JABBER_LATCH = 1, 2, 4
 OFFLINE, DETECTION, DATA_EXCHANGE = 0, 1, 3
 
 
@@ -84,9 +85,6 @@ async def power_fail(dut):
     await tb.start()                                               # apf_ni is 0: no power
     await tb.poke(reg("CTRL"), 8)
     assert await tb.peek(reg("STATUS")) == 4
-    dut.efault_i.value = 1
-    assert await tb.peek(reg("STATUS")) == 4 + 8
-    dut.efault_i.value = 0
     call = telegram.encode_call("RDIO", 5)
     tb.answers[call] = 7
 
@@ -104,6 +102,105 @@ async def power_fail(dut):
     await tb.event(APF_CHANGE)
     assert await tb.peek(reg("STATUS")) == 4
     assert await batch() >> 4 & 15 == ABORTED and tb.calls() == [call]
+
+
+@cocotb.test(timeout_time=50, timeout_unit="ms")
+async def earth_fault(dut):
+    """LT-016, LT-017: an earth fault shows after P_EF (100 us here), as state, event and latch; calls go on with it. The
+    power fail before is over and still latched."""
+    tb = MasterTB(dut)
+    dut.efault_i.value = 0
+    await tb.power_up()
+    assert await tb.peek(reg("LATCH")) == APF_LATCH and await tb.peek(reg("STATUS")) == 0
+    await tb.poke(reg("LATCH"), 7)
+    call = telegram.encode_call("RDIO", 5)
+    tb.answers[call] = 7
+    dut.efault_i.value = 1
+    began = get_sim_time("ns")
+    assert await tb.peek(reg("STATUS")) == 0
+    await tb.event(EFAULT_CHANGE)
+    assert get_sim_time("ns") - began >= 100_000
+    assert await tb.peek(reg("STATUS")) == 8 and await tb.peek(reg("LATCH")) == EFAULT_LATCH
+    await tb.poke(BATCH, call)
+    await tb.poke(reg("BATCH"), 1)
+    await tb.event(BATCH_DONE)
+    assert await tb.peek(BATCH) & 0xFF == 7 and tb.calls() == [call]
+    dut.efault_i.value = 0
+    await tb.event(EFAULT_CHANGE)
+    assert await tb.peek(reg("STATUS")) == 0 and await tb.peek(reg("LATCH")) == EFAULT_LATCH
+    await tb.poke(reg("LATCH"), EFAULT_LATCH)
+    assert await tb.peek(reg("LATCH")) == 0
+
+
+@cocotb.test(timeout_time=50, timeout_unit="ms")
+async def front_end(dut):
+    """LT-014, LT-015: the differentiated tx_dac_o of the chip is the request; the held amplitude is dropped once after
+    it and once after the answer, never inside."""
+    tb = MasterTB(dut)
+    await tb.power_up()
+    call = telegram.encode_call("WPAR", 12, 0b0110)
+    tb.answers[call] = 7
+    codes, clears = [], []
+
+    async def watch_pins():
+        at = began = round(get_sim_time("ns"))
+        while True:
+            await FallingEdge(tb.clk)
+            at += tb.PERIOD_NS
+            codes.append(int(dut.tx_dac_o.value))
+            if int(dut.rx_vth_clear_o.value):
+                clears.append((at - began) // tb.PERIOD_NS)
+    await FallingEdge(tb.clk)
+    cocotb.start_soon(watch_pins())
+    await tb.poke(BATCH, call)
+    await tb.poke(reg("BATCH"), 1)
+    await tb.event(BATCH_DONE)
+    await Timer(50, "us")
+    assert await tb.peek(BATCH) & 0xFF == 7 and tb.calls() == [call]
+    slope = [a - b for a, b in zip(codes, codes[1:])]              # rising current = negative pulse
+    first = next(k for k, v in enumerate(slope) if v < -1) - 1     # the first step is one code, like those of the bias
+    pulses = [(half * 3_000, 1 if total > 0 else -1) for half in range(27)
+              if abs(total := sum(slope[first + 24 * half:first + 24 * half + 24])) > 200]
+    assert pulses == telegram.request_pulses(call)
+    assert codes[first] == 12 and max(codes) == 255 and codes[0] == codes[-1] == 0
+    runs = [k for k in clears if k - 1 not in clears]
+    assert len(clears) == 2 * 16 and len(runs) == 2                # 2 us each
+    last = first + 78 * 8                                          # of the request, answered 21.5 us later
+    # P_PAUSE and the delay of the strobe; exact to the clock in cocotb_vth, here the pulses change on clock edges
+    assert abs(runs[0] - (last + 67 + 8 + 1)) <= 1 and abs(runs[1] - runs[0] - (21_500 + 36_000) // 125) <= 1
+
+
+@cocotb.test(timeout_time=50, timeout_unit="ms")
+async def jabber(dut):
+    """LT-013, LT-017: a request during which the sender's time ends is cut at the pins, latched until it is cleared,
+    and the next one passes. The time is set by hand: the chip itself never sends for so long."""
+    tb = MasterTB(dut)
+    await tb.power_up()
+    await tb.poke(reg("LATCH"), 7)
+    call = telegram.encode_call("RDIO", 5)
+    tb.answers[call] = 7
+    await tb.poke(BATCH, call)
+    await tb.poke(reg("BATCH"), 1)
+    await RisingEdge(dut.tx_en_o)
+    await FallingEdge(dut.tx_man_o)
+    await Timer(20, "us")
+    await FallingEdge(tb.clk)
+    assert int(dut.tx_en_o.value) == 1
+    dut.u_tx_guard.cnt_q.value = 2**12 - 1                         # one clock to go
+    await FallingEdge(tb.clk)
+    await FallingEdge(tb.clk)
+    for _ in range(300):
+        assert (int(dut.tx_man_o.value), int(dut.tx_en_o.value)) == (1, 0)
+        await FallingEdge(tb.clk)
+    assert int(dut.tx_dac_o.value) == 0
+    await tb.event(BATCH_DONE)
+    assert await tb.peek(BATCH) >> 4 & 15 != 0 and await tb.peek(reg("LATCH")) == JABBER_LATCH
+    await tb.poke(reg("LATCH"), JABBER_LATCH)
+    tb.trains.clear()
+    await tb.poke(BATCH, call)
+    await tb.poke(reg("BATCH"), 1)
+    await tb.event(BATCH_DONE)
+    assert await tb.peek(BATCH) & 0xFF == 7 and tb.calls() == [call] and await tb.peek(reg("LATCH")) == 0
 
 
 @cocotb.test(timeout_time=50, timeout_unit="ms")

@@ -67,8 +67,8 @@ async def once_per_pause(dut):
 
 @cocotb.test(timeout_time=1, timeout_unit="ms")
 async def gap_lengths(dut):
-    """LT-014: a gap of P_PAUSE between two pulses gives no clear, none at all; one clock more gives one, cut short by the
-    strobe of the second pulse; the second pulse has its own."""
+    """LT-014: a gap of P_PAUSE between two pulses gives no clear; one clock more gives one, cut short by the strobe of
+    the second pulse; the second pulse has its own."""
     tb = await TB(dut).start()
     for gap in (tb.us(3), tb.us(6), tb.us(7.5), tb.pause - 1, tb.pause, tb.pause + 1, tb.pause + 5,
                 tb.pause + tb.length - 1, tb.pause + tb.length, tb.pause + tb.length + 1):

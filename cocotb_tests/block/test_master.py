@@ -11,7 +11,7 @@ SOURCES = [s for s in SOURCES if RTL / s not in PACKAGES] + [VEXRISCV]
 def test_master():
     program = ROOT / "build/cocotb/master_probe.hex"
     build(ROOT / "cocotb_tests/block/soc_probe.c", 0, program)
-    # shorter power filter: the defaults are the business of the line guard's own test
+    # shorter filters: the defaults are the business of the line guard's own test
     run_cocotb("asi_master", SOURCES, "cocotb_tests.block.cocotb_master", name="asi_master-block",
-               parameters={"ClkHz": 8_000_000, "ApfOkNs": 100_000, "ApfOnNs": 50_000},
+               parameters={"ClkHz": 8_000_000, "ApfOkNs": 100_000, "ApfOnNs": 50_000, "EfNs": 100_000},
                plusargs=[f"+firmware={program}"])
