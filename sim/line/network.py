@@ -24,7 +24,7 @@ DECOUPLING_OHM = 78.0           # ... with 39 Ohm in parallel in each leg (EK)
 SLAVE_OHM, SLAVE_H, SLAVE_F = 13.5e3, 13e-3, 30e-12  # load of an extended-address slave IC
 SECTION_M = 5.0                 # longest lumped section: 30 ns, a hundredth of an edge
 SEGMENT_M = 100.0               # longest segment, stubs included
-FLOOR_F = 10e-12                # of every node, so that no node is without a state (EK: terminals)
+FLOOR_F = 10e-12                # of every named node (EK: terminals)
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class Line:
             for k in range(count):
                 there = index[b] if k == count - 1 else len(farad)
                 if there == len(farad):
-                    farad.append(FLOOR_F)
+                    farad.append(0.0)
                     siemens.append(0.0)
                 for node in (here, there):
                     farad[node] += cable.c * part / 2
