@@ -110,12 +110,11 @@ class Outcome(NamedTuple):
         return self.error_class == ErrorClass.OK and self.data != self.sent
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def responses(hop: Hop, near: BandPass, far: BandPass) -> np.ndarray:
     """[receiver near/far, sender near/far, step] in V per A behind the band passes."""
     line = Line(hop.segment, (hop.near, hop.far), (hop.near, hop.far))
-    first = line.through(near).edge_responses()
-    return first if near == far else np.stack([first[0], line.through(far).edge_responses()[1]])
+    return line.through((near, far)).edge_responses()
 
 
 class _Way:
@@ -126,6 +125,7 @@ class _Way:
             raise ValueError("one repeater between each two segments, please")
         self.setup, self.rng = setup, rng
         self.requests: list[tuple[Train, np.ndarray]] = []       # per segment: pulses and their swings, from `near`
+        self.ends: list[float] = []                              # per segment: last request pulse
 
     def _ends(self, k: int) -> tuple[Receiver, Receiver, Sender, Sender]:
         s = self.setup
@@ -160,6 +160,7 @@ class _Way:
             last = k == len(s.hops) - 1
             sent, swings = self._swings(train, near_tx, k == 0)
             self.requests.append((sent, swings))
+            self.ends.append(train[-1][0] if train else LEAD_NS + 78_000.0)
             start = (train[0][0] if train else LEAD_NS) - LEAD_NS
             volts = superpose(responses(hop, near_rx.band, far_rx.band)[1, 0], sent, swings, start, REQUEST_CLOCKS)
             volts, levels = self._levels(volts, far_rx)
@@ -172,7 +173,7 @@ class _Way:
     def answer(self, data: int) -> Outcome:
         s = self.setup
         word = response_word(data)
-        ends = [train[-1][0] if train else LEAD_NS + 78_000.0 for train, _ in self.requests]
+        ends = self.ends
         train = s.slave.train(word, 7, ends[-1] + SYNC_NS + CLOCK_NS * self.rng.random(), self.rng)
         for k in reversed(range(len(s.hops))):
             near_rx, far_rx, _, far_tx = self._ends(k)

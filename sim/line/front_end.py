@@ -101,7 +101,7 @@ def _through(v: np.ndarray, band: BandPass, pad: bool = False) -> np.ndarray:
     size = len(v)
     if not pad:
         return np.fft.irfft(np.fft.rfft(v) * _gains(size, band), size)
-    long = np.concatenate([v, v[-1] * np.linspace(1, 0, 3 * size)])    # back to zero slowly, the high pass forgets it
+    long = np.concatenate([v, v[-1] * np.linspace(1, 0, size), np.zeros(size)])  # what wraps has faded by then
     return np.fft.irfft(np.fft.rfft(long) * _gains(len(long), band), len(long))[:size]
 
 

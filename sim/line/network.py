@@ -9,7 +9,7 @@ a sum of shifted edge responses. Discretisation: exact for the network, the curr
 hold). Requirements: AN-001..AN-003 (docs/requirements.md).
 """
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -63,6 +63,7 @@ class Segment:
     decoupling_h: float = DECOUPLING_H
     decoupling_ohm: float = DECOUPLING_OHM
     section_m: float = SECTION_M
+    longest_m: float = SEGMENT_M      # more only to see where it breaks
 
     @property
     def length(self) -> float:
@@ -83,8 +84,8 @@ class Segment:
             reached, grown = reached | more, bool(more)
         if len(reached) != len(nodes):
             raise ValueError("the cables are no tree")
-        if self.length > SEGMENT_M + 1e-9 or any(metres <= 0 for _, _, metres in self.cables):
-            raise ValueError(f"{self.length:.1f} m of cable: a segment has at most {SEGMENT_M:.0f} m, no cable has none")
+        if self.length > self.longest_m + 1e-9 or any(metres <= 0 for _, _, metres in self.cables):
+            raise ValueError(f"{self.length:.1f} m of cable: at most {self.longest_m:.0f} m, and no cable of 0 m")
         for node in (self.power, *(node for node, _ in self.loads)):
             if node not in nodes:
                 raise ValueError(f"no cable ends at '{node}'")
@@ -101,9 +102,6 @@ class Segment:
                         far[other] = far[here] + metres
                         todo.append(other)
         return far[b]
-
-    def scaled(self, **changes) -> "Segment":
-        return replace(self, **changes)
 
 
 @dataclass(frozen=True)
@@ -194,22 +192,24 @@ class Line:
             self.c[j, index[name]] = scale[index[name]]
         self.physical = size      # the first states store energy: 1/2 |x|^2 is in J
 
-    def through(self, band: BandPass) -> "Line":
-        """With a front end behind every receiver: the outputs are what the comparators see, per receiver."""
+    def through(self, bands: Sequence[BandPass]) -> "Line":
+        """With a front end behind every receiver: the outputs are what their comparators see."""
         n, m = len(self.a), len(self.c)
-        high, low = 2 * np.pi * band.high_hz, 2 * np.pi * band.low_hz
+        if len(bands) != m:
+            raise ValueError(f"{len(bands)} band passes for {m} receivers")
+        high = np.diag([2 * np.pi * band.high_hz for band in bands])
+        low = np.diag([2 * np.pi * band.low_hz for band in bands])
         a = np.zeros((n + 3 * m, n + 3 * m))
         a[:n, :n] = self.a
-        eye = np.eye(m)
         h, p, q = (slice(n + j * m, n + (j + 1) * m) for j in range(3))  # high pass, first and second low pass
-        a[h, :n], a[h, h] = high * self.c, -high * eye
-        a[p, :n], a[p, h], a[p, p] = low * self.c, -low * eye, -low * eye
-        a[q, p], a[q, q] = low * eye, -low * eye
+        a[h, :n], a[h, h] = high @ self.c, -high
+        a[p, :n], a[p, h], a[p, p] = low @ self.c, -low, -low
+        a[q, p], a[q, q] = low, -low
         other = object.__new__(Line)
         other.a, other.physical = a, self.physical
         other.b = np.vstack([self.b, np.zeros((3 * m, self.b.shape[1]))])
         other.c = np.zeros((m, n + 3 * m))
-        other.c[:, q] = eye
+        other.c[:, q] = np.eye(m)
         return other
 
     def discrete(self, step: float = STEP_S) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
