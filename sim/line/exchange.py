@@ -4,7 +4,7 @@
 The request goes from the master through every segment to the slave's receiver (14 bits), the answer back to the master's
 (7 bits). The slave's receiver is the chip's own asi_rx with 14 bits: the rules are the same, no other one is at hand.
 What asi_xact adds is modelled: listening starts P_TX_MASK after the last request pulse, a pulse before P_RX_OPEN is
-EARLY, none at all is NO_RESPONSE. The answer is sent whether or not the request was understood, so that the two
+EARLY, none until P_RX_TIMEOUT is NO_RESPONSE. The answer is sent whether or not the request was understood, so that the two
 directions count apart. Requirements: AN-005..AN-007, AN-010 (docs/requirements.md).
 """
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ from .rtl import receive
 
 LEAD_NS = 12_000.0           # pause in front of a request
 SYNC_NS = 21_500.0           # last request pulse to first answer pulse, synchronous slave
-MASK_NS, OPEN_NS = 4_500.0, 12_000.0   # P_TX_MASK, P_RX_OPEN
+MASK_NS, OPEN_NS, TIMEOUT_NS = 4_500.0, 12_000.0, 66_000.0   # P_TX_MASK, P_RX_OPEN, P_RX_TIMEOUT
 REQUEST_CLOCKS = 1856        # 116 us: pause, request, decision, and 12 us for a receiver that began too late
 ANSWER_LEAD_NS = 24_000.0    # the last request pulse is in the window
 ANSWER_CLOCKS = 1408         # 88 us
@@ -189,7 +189,7 @@ class _Way:
             heard = [(c, p) for c, p in got.pulses if c >= listen]
             if k:
                 train = s.repeaters[k - 1].resend([(start + CLOCK_NS * c, p) for c, p in heard])
-        if got.error_class is None or got.first is None:
+        if got.error_class is None or start + CLOCK_NS * got.first > ends[0] + TIMEOUT_NS:
             error = ErrorClass.NO_RESPONSE
         elif start + CLOCK_NS * got.first < ends[0] + OPEN_NS:
             error = ErrorClass.EARLY

@@ -35,10 +35,10 @@ def plot_sweeps(data: dict[str, Any], path: Path) -> None:
     rows = -(-len(data["sweeps"]) // columns)
     figure, axes = plt.subplots(rows, columns, figsize=(12, 2.1 * rows), layout="constrained")
     for axis, entry in zip(axes.flat, data["sweeps"]):
-        for where, marker in zip(WAYS, ("o", "x")):
+        for where, style in zip(WAYS, ("-", "--")):
             x = [p["value"] for p in entry["points"]]
             y = [100 * p[where]["failed"] / p[where]["telegrams"] for p in entry["points"]]
-            axis.plot(x, y, color=COLOURS[where], marker=marker, markersize=3, linewidth=1, label=where)
+            axis.plot(x, y, color=COLOURS[where], linestyle=style, linewidth=1.3, label=where)
             if entry["limits"][where] is not None:
                 axis.axvline(entry["limits"][where], color=COLOURS[where], linestyle=":", linewidth=1.2)
         words, lines = entry["title"].split(), [""]
@@ -49,8 +49,11 @@ def plot_sweeps(data: dict[str, Any], path: Path) -> None:
         axis.set_ylim(-4, 104)
         if x[0] > x[-1]:
             axis.invert_xaxis()
-        if x[-1] > 50 * max(1, x[1] - x[0]) and entry["name"] in ("damping",):
+        axis.set_yticks([0, 50, 100])
+        if entry["name"] == "damping":
             axis.set_xscale("log")
+        else:
+            axis.locator_params(axis="x", nbins=5)
     for axis in list(axes.flat)[len(data["sweeps"]):]:
         axis.axis("off")
     axes.flat[0].legend(fontsize=7)
