@@ -58,7 +58,7 @@ def test_rising_current_is_a_negative_pulse():
 
 
 def test_near_looks_smaller_than_far():
-    """AN-002: on a long line a receiver near the power unit sees less than a far one (field rule), so thresholds adapt."""
+    """AN-002: on a long line a receiver near the power unit sees less than a far one (field rule)."""
     r = Line(bus(), ("far",), ("master", "far")).edge_responses(512)
     assert -r[1, 0].min() > 1.5 * -r[0, 0].min()
 
@@ -246,7 +246,7 @@ def test_band_pass_in_the_network_is_the_same():
 
 
 def test_receiver_amplitude():
-    """AN-001: the amplitude of a full segment at 60 mA is inside the 3..8 Vpp a receiver must take, in both directions."""
+    """AN-001: at 60 mA the amplitude is inside the 3..8 Vpp a receiver must take, in both directions."""
     for segment in (point_to_point(), bus(), tree()):
         for volts in receiver_amplitude(Hop(segment), Receiver()):
             assert 3 <= 0.06 * volts <= 8

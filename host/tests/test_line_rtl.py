@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Telegrams through the analog line model into the real receiver RTL, faults, Monte Carlo."""
+import io
 import json
+import re
 import subprocess
 import sys
 from argparse import Namespace
@@ -14,7 +16,6 @@ from asi.regmap import ErrorClass
 from asi.telegram import decode_call, pulses, request_word, response_word
 from sim.line import capture, margins, monte_carlo, sweeps
 from sim.line.exchange import Hop, Repeater, Sender, Setup, exchange
-from sim.line.front_end import Comparators, Disturbance
 from sim.line.network import bus, point_to_point, tree
 from sim.line.rtl import receive
 
@@ -34,7 +35,7 @@ def levels(train, clocks=2000, width_ns=1500.0):
 
 
 def test_receiver_harness():
-    """RX-003, RX-004, AN-006: ideal levels into the Verilated receivers: data, first pulse and pulses come back as sent."""
+    """RX-003, RX-004, AN-006: ideal levels into the Verilated receivers come back as they were sent."""
     for word, bits, data in ((response_word(9), 7, 9), (request_word(0x2F3), 14, 0x2F3)):
         train = [(5000 + t, p) for t, p in pulses(word, bits)]
         got = receive(levels(train), 0, bits)
@@ -86,7 +87,7 @@ def test_must_detect(gain, expected):
 
 
 def test_must_ignore():
-    """AN-005: a foreign pulse below 30 % of the amplitude does no harm; one of 150 % does, and is not taken for data."""
+    """AN-005: a foreign pulse below 30 % does no harm; one of 150 % does, and is not taken for data."""
     generator = rng(4)
     harmed = 0
     for data in range(16):
@@ -133,7 +134,7 @@ def test_classes_of_faults(edit, classes):
 @pytest.mark.parametrize("repeaters", [1, 2])
 @pytest.mark.parametrize("retimed", [True, False])
 def test_repeaters(repeaters, retimed):
-    """AN-010: telegrams pass one and two repeaters; pulses of those that do not re-time come later against the first."""
+    """AN-010: telegrams pass one and two repeaters; without re-timing pulses come later against the first."""
     hops = (Hop(bus()),) * (repeaters + 1)
     setup = Setup(hops, repeaters=(Repeater(retimed=retimed),) * repeaters)
     generator = rng(7)
@@ -232,12 +233,18 @@ def test_confidence_bound():
     assert monte_carlo.upper_bound(5, 5) == 1.0
 
 
-def test_margins_tables(monkeypatch):
-    """AN-009: `make margins` in one process: every sweep and population in data and tables; what is broken is named."""
+@pytest.fixture
+def few_sweeps(monkeypatch):
     monkeypatch.setattr(margins, "SWEEPS", tuple(s for s in sweeps.SWEEPS if s.name in ("repeaters", "mains")))
-    args = Namespace(samples=2, telegrams=2, seed=1, no_dask=True, scheduler="")
-    console = Console(record=True, width=200, file=open("/dev/null", "w"))
-    data = json.loads(json.dumps(margins.measure(args, console)))
+
+
+ARGS = Namespace(samples=2, telegrams=2, seed=1, no_dask=True, scheduler="")
+
+
+def test_margins_tables(few_sweeps):
+    """AN-009: `make margins` in one process: every sweep and population in data and tables; what is broken is named."""
+    console = Console(record=True, width=200, file=io.StringIO())
+    data = json.loads(json.dumps(margins.measure(ARGS, console)))
     assert [e["name"] for e in data["sweeps"]] == ["mains", "repeaters"]
     assert data["monte_carlo"]["legal"]["request"]["telegrams"] == 2 * monte_carlo.EXCHANGES
     assert margins.broken(data) == []
@@ -246,6 +253,28 @@ def test_margins_tables(monkeypatch):
     data["monte_carlo"]["legal"]["answer"]["wrong"] = 1
     data["sweeps"][1]["request"]["keeps_limit"] = False
     assert len(margins.broken(data)) == 2
+
+
+def test_margins_page(tmp_path):
+    """AN-009: the page has every sweep and both populations, and its plots exist."""
+    pytest.importorskip("matplotlib", reason="matplotlib comes with make margins only")
+    from sim.line.margins_page import write_page
+    points = [{"value": v, **{w: {"telegrams": 2, "failed": 0, "wrong": 0, "classes": {}} for w in margins.WAYS}}
+              for v in (0, 1)]
+    way = {"last_good": 1, "first_bad": None, "keeps_limit": None, "wrong": 0}
+    part = monte_carlo.run_samples("legal", 0, 2, 1)
+    found = {**monte_carlo.summary(part), "extremes_ns": [[s.early_ns, s.late_ns] for s in part],
+             "by_disturbance": margins.by_disturbance(part)}
+    data = {"date": "2026-01-01", "seconds": 1, "seed": 1, "command": "x", "telegrams_per_point": 2,
+            "exchanges_per_sample": 16, "sweeps": [{"name": s.name, "title": s.title, "unit": s.unit, "source": s.source, "points": points,
+                        "limits": {"request": None, "answer": None}, "request": way, "answer": way}
+                       for s in sweeps.SWEEPS], "monte_carlo": {"legal": found, "stress": found}}
+    write_page(data, tmp_path, tmp_path / "images")
+    page = (tmp_path / "margins.md").read_text()
+    assert all(f"| {s.title} |" in page for s in sweeps.SWEEPS)
+    for image in re.findall(r"!\[.*?\]\((.*?)\)", page):
+        assert (tmp_path / image).read_text().rstrip().endswith("</svg>")
+    assert page.count("![") == 3
 
 
 def test_margins_command():

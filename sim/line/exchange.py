@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Request and answer through the line: senders, segments, repeaters, front ends and the real receiver RTL.
 
-The request goes from the master through every segment to the slave's receiver (14 bits), the answer back to the master's
-(7 bits). The slave's receiver is the chip's own asi_rx with 14 bits: the rules are the same, no other one is at hand.
-What asi_xact adds is modelled: listening starts P_TX_MASK after the last request pulse, a pulse before P_RX_OPEN is
-EARLY, none until P_RX_TIMEOUT is NO_RESPONSE. The answer is sent whether or not the request was understood, so that the two
-directions count apart. Requirements: AN-005..AN-007, AN-010 (docs/requirements.md).
+The request goes from the master through every segment to the slave's receiver (14 bits), the answer back to the
+master's (7 bits). The slave's receiver is the chip's own asi_rx with 14 bits: the rules are the same, no other one is
+at hand. What asi_xact adds is modelled: listening starts P_TX_MASK after the last request pulse, a pulse before
+P_RX_OPEN is EARLY, none until P_RX_TIMEOUT is NO_RESPONSE. The answer is sent whether or not the request was
+understood, so that the two directions count apart. Requirements: AN-005..AN-007, AN-010 (docs/requirements.md).
 """
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -129,9 +129,9 @@ class _Way:
 
     def _ends(self, k: int) -> tuple[Receiver, Receiver, Sender, Sender]:
         s = self.setup
-        near_rx, near_tx = (s.master_rx, s.master) if k == 0 else (s.repeaters[k - 1].receiver, s.repeaters[k - 1].sender)
-        last = k == len(s.hops) - 1
-        far_rx, far_tx = (s.slave_rx, s.slave) if last else (s.repeaters[k].receiver, s.repeaters[k].sender)
+        receivers = [s.master_rx, *(r.receiver for r in s.repeaters), s.slave_rx]
+        senders = [s.master, *(r.sender for r in s.repeaters), s.slave]
+        near_rx, far_rx, near_tx, far_tx = receivers[k], receivers[k + 1], senders[k], senders[k + 1]
         return near_rx, far_rx, near_tx, far_tx
 
     def _swings(self, train: Train, sender: Sender, observed: bool) -> tuple[Train, np.ndarray]:
@@ -214,6 +214,6 @@ def exchange(setup: Setup, call: int, data: int, rng: np.random.Generator) -> tu
 
 
 def receiver_amplitude(hop: Hop, rx: Receiver = Receiver()) -> tuple[float, float]:
-    """Peak-peak in V at the line per A of swing, of a lone edge (twice its peak): request at `far`, answer at `near`."""
+    """V peak-peak on the line per A of swing, for a lone edge (twice its peak): request at `far`, answer at `near`."""
     line = Line(hop.segment, (hop.near, hop.far), (hop.near, hop.far)).edge_responses(512)
     return float(-2 * line[1, 0].min()), float(-2 * line[0, 1].min())

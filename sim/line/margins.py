@@ -23,7 +23,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from .monte_carlo import EXCHANGES, POPULATIONS, Sample, draw, run_sample, run_samples, summary
-from .sweeps import BY_NAME, SWEEPS, first_error, keeps_limit, run_point
+from .sweeps import SWEEPS, first_error, keeps_limit, run_point
 
 CHUNK = 20                       # samples per task
 WAYS = ("request", "answer")
@@ -90,11 +90,11 @@ def measure(args: argparse.Namespace, console: Console) -> dict[str, Any]:
     for population in POPULATIONS:
         part = sorted(samples[population], key=lambda s: s.number)
         data["monte_carlo"][population] = {**summary(part), "extremes_ns": [[s.early_ns, s.late_ns] for s in part],
-                                           "by_disturbance": _by_disturbance(part)}
+                                           "by_disturbance": by_disturbance(part)}
     return data
 
 
-def _by_disturbance(samples: list[Sample]) -> list[dict[str, Any]]:
+def by_disturbance(samples: list[Sample]) -> list[dict[str, Any]]:
     """Failed and wrong telegrams by the sum of the disturbances' peaks, in steps of 0.5 V (0.1 V below 0.5 V)."""
     edges = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
     out = []
@@ -170,7 +170,7 @@ def one_sample(text: str, seed: int, console: Console) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="make margins ARGS=...", description=__doc__.splitlines()[0])
-    parser.add_argument("--samples", type=int, default=3000, help="Monte Carlo samples per population")
+    parser.add_argument("--samples", type=int, default=2000, help="Monte Carlo samples per population")
     parser.add_argument("--telegrams", type=int, default=64, help="exchanges per point of a sweep")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scheduler", default="", help="Dask scheduler (tcp://...); default: a process per core")

@@ -43,7 +43,8 @@ def plot_sweeps(data: dict[str, Any], path: Path) -> None:
                 axis.axvline(entry["limits"][where], color=COLOURS[where], linestyle=":", linewidth=1.2)
         words, lines = entry["title"].split(), [""]
         for word in words:
-            lines = [*lines[:-1], f"{lines[-1]} {word}".strip()] if len(lines[-1]) + len(word) < 38 else [*lines, word]
+            fits = len(lines[-1]) + len(word) < 38
+            lines = [*lines[:-1], f"{lines[-1]} {word}".strip()] if fits else [*lines, word]
         axis.set_title("\n".join(lines), fontsize=8)
         axis.set_xlabel(entry["unit"])
         axis.set_ylim(-4, 104)
@@ -90,7 +91,7 @@ def plot_wave(path: Path) -> None:
         axes[1].step(t, (outcome.levels & bit > 0) * 0.8 + (0 if bit == 1 else 1), color=colour, linewidth=0.9,
                      where="post", label=name)
     axes[1].set_yticks([0.4, 1.4], ["negative", "positive"])
-    axes[1].set_xlabel("us from the first edge of the answer; left: the last pulse of the request, as the master hears it")
+    axes[1].set_xlabel("us from the first edge of the answer; left: the end of the request, as the master hears it")
     axes[1].set_xlim(-24, 48)
     _save(figure, path)
 
@@ -109,90 +110,137 @@ def _spice_rows() -> list[list[str]]:
     return rows
 
 
+TEXT = """\
+# Margins of the line
+
+Where telegrams begin to fail when line, senders, front end and disturbances leave their nominal values: an analog model
+of the line with the real receiver RTL (`rtl/phy/asi_rx.sv` and its filter, Verilated) behind its comparators.
+Simulated, not measured on hardware. EK marks constants that are engineering knowledge, not from a public source.
+
+Made by `{command}` on {date} ({seconds} s).
+Plots, tables and all counts as JSON: `build/margins`. One Monte Carlo sample again:
+`make margins ARGS='--sample legal:7'`. On a cluster: `make margins SCHEDULER=tcp://host:8786`; its workers start in the same checkout (shared or copied) with
+the receiver library built and `PYTHONPATH=.:host/python`. This page: `make margins ARGS=--docs`.
+
+## What a board designer can take from it
+
+* **Least signal.** The threshold while nothing is held (0.6 V, EK) decides: requests are good down to
+  {amplitude_request}, answers down to {amplitude_answer}; 3 Vpp is the least legal signal.
+* **Noise in pauses.** The same 0.6 V is all there is against noise before a first pulse, so a stronger signal does not
+  help much: white noise is good up to {white_3v} rms at 3 Vpp and {white_5v} at 5 Vpp (rms behind the band pass). A
+  higher level there buys noise margin and costs weak signals.
+* **Late pulses.** The peak hold sees the first pulse at that lower threshold, so all later pulses look late: about
+  0.5 us on a clean line, {late} ns at most on all legal ones. The late window (1500 ns) is made for this; the early
+  one (875 ns) is hardly used ({early} ns).
+* **Sines.** 100 kHz at 3 Vpp is good up to {sine_3v} amplitude. The 30 % rule is about lone interference, and that
+  holds: {ghost} of the amplitude. A lasting sine also moves the pulses.
+* **DC.** Steps of {dip} with 20 us and 50 Hz of {mains} do no harm at 3 Vpp. A higher corner of the high pass helps
+  both and costs signal.
+* **Capacitance and damping.** {capacitance} of additional capacitance at the far end is the most (suppressors and
+  filters of all devices together); decoupling without its resistors rings: {damping} in place of 78 Ohm still works.
+* **Clock and jitter.** {fast} fast and {slow} slow are good, against a required 1000 ppm; so is jitter of +-{jitter}.
+* **Repeaters** that re-time do not add up; those that do not cost late window each, and more than
+  {repeaters_raw} in series fail.
+
+## One parameter at a time
+
+Nominal: 100 m of straight line, 31 slaves, 60 mA, threshold 50 %, no disturbance; {telegrams} exchanges per value.
+Request: at the far slave (14 bits). Answer: at the master (7 bits). Dotted: limits.
+
+![failed telegrams over each parameter]({sweeps_svg})
+
+{sweep_table}
+
+"none" under "first error": no error up to the end of the sweep. Where the limits come from:
+
+{sources}
+
+## All at once (Monte Carlo)
+
+{samples} installations per population, {exchanges} exchanges on each, seed {seed}: a random tree of up to 100 m per
+segment, random cable, power unit and stations anywhere, up to 62 slaves, up to two repeaters, senders with 55..68 mA
+and +-1000 ppm, thresholds 45..55 %.
+*legal*: disturbances together below 0.45 V (30 % of the weakest legal pulse), jitter up to 100 ns, later pulses
+90..110 % of the first. *stress*: up to 3 V, up to 1 us, 40..140 %, and foreign pulses.
+
+{mc_table}
+
+Bound: upper 95 % confidence bound (Clopper-Pearson) of the probability that a telegram of this population is accepted
+wrongly, telegrams taken as independent.
+
+{wrong}
+
+{disturbance_table}
+
+Pulse starts of accepted telegrams on the legal lines: {early} to {late} ns (windows -875 to +1500 ns).
+
+![earliest and latest pulses]({windows_svg})
+
+## The model
+
+![an answer at the master]({wave_svg})
+
+* **Senders**: current edges `t/T - sin(2 pi t/T)/(2 pi)`, T = 3 us, 55..68 mA (EK).
+* **Line**: tree of lumped sections of at most 5 m (10 m in the Monte Carlo); data decoupling 100 uH parallel 78 Ohm
+  (EK), the power unit an AC short; slaves 13.5 kOhm, 13 mH, 30 pF (data sheet). R' 20..90 mOhm/m, C' 30..80 pF/m,
+  L' 0.4..1.3 uH/m, G' up to 5 uS/m (EK), impedance 80..120 Ohm.
+* **Time**: exact state transition at 7.8 ns, the current linear within a step; edges are superposed on that grid.
+* **Front end**: high pass 7 kHz (one pole), low pass 1 MHz (two poles) (EK); threshold 0.6 V until the first negative
+  pulse, then 45..55 % of its peak, followed for 2.5 us (EK); hysteresis 5 % (EK); cleared after 9 us without a pulse
+  (EK).
+* **Repeaters**: own receiver, 2..5 us of delay, pulses leave on the 3 us grid of the first one (EK).
+* **Not in it**: saturation and clipping, common mode, temperature, the shaper's own errors, a slave's own receiver (the
+  chip's receiver with 14 bits stands in for it).
+
+The line against ngspice, which has sections of 1 m; its waveforms are stored in `sim/line/reference`, and
+`python -m sim.line.spice` runs it again where it is installed:
+
+{spice_table}
+"""
+
+
+def _wrong(data: dict[str, Any]) -> str:
+    """What the stress population says about undetected errors."""
+    stress = data["monte_carlo"]["stress"]
+    wrong, telegrams = (sum(stress[w][what] for w in WAYS) for what in ("wrong", "telegrams"))
+    if not wrong:
+        return f"Under stress none of {telegrams} telegrams was accepted with wrong content."
+    least = min(b["from_v"] for b in stress["by_disturbance"] if b["wrong"])
+    worst = max(stress["wrong"], key=lambda w: w["sample"])
+    return (f"Under stress {wrong} of {telegrams} telegrams were accepted with wrong content, all with disturbances\n"
+            f"above {least:g} V peak in sum. Two changed bits keep the parity; the line code cannot exclude that, the\n"
+            f"receiver's checks make it rare. One to look at: `make margins ARGS='--sample stress:{worst['sample']}'`.")
+
+
 def write_page(data: dict[str, Any], folder: Path, images: Path) -> None:
     """folder/margins.md with its three plots in images."""
     folder.mkdir(parents=True, exist_ok=True)
     images.mkdir(parents=True, exist_ok=True)
-    names = [images / f"margins_{what}.svg" for what in ("sweeps", "windows", "wave")]
-    plot_sweeps(data, names[0])
-    plot_windows(data, names[1])
-    plot_wave(names[2])
-    links = [os.path.relpath(name, folder) for name in names]
-    by = {entry["name"]: entry for entry in data["sweeps"]}
-    legal, stress = data["monte_carlo"]["legal"], data["monte_carlo"]["stress"]
-    wrong = sum(stress[w]["wrong"] for w in WAYS)
-    telegrams = sum(stress[w]["telegrams"] for w in WAYS)
-    least_wrong = min((b["from_v"] for b in stress["by_disturbance"] if b["wrong"]), default=None)
-
-    def good(name: str, where: str | None = None) -> str:
-        values = [by[name][w]["last_good"] for w in ((where,) if where else WAYS)]
-        if any(v is None for v in values):
-            return "no value tested"
-        rising = by[name]["points"][-1]["value"] > by[name]["points"][0]["value"]
-        return f"{(min if rising else max)(values):g} {by[name]['unit']}".strip()
-
-    sweep_head = ["Parameter", "Limit (request / answer)", "Request: last good", "first error", "Answer: last good",
-                  "first error", "Limit kept"]
-    sweep_table = [[r[0], r[1], *r[2].split(" | "), *r[3].split(" | "), r[4]] for r in sweep_rows(data)]
-    where_from = "; ".join(f"{e['title'].split(',')[0]}: {e['source']}" for e in data["sweeps"] if e["source"])
-    text = ["# Margins of the line", "",
-            "Where telegrams begin to fail when line, senders, front end and disturbances leave their nominal values:",
-            "an analog model of the line with the real receiver RTL (`rtl/phy/asi_rx.sv` and its filter, Verilated) behind",
-            "its comparators. Simulated, not measured on hardware.", "",
-            f"Made by `{data['command']}` on {data['date']} ({data['seconds']} s). The sample number is the seed:",
-            "`make margins ARGS='--sample legal:7'` shows one again. A cluster: `make margins SCHEDULER=tcp://host:8786`; its",
-            "workers start in the same checkout (shared or copied), with the library built and `PYTHONPATH=.:host/python`.", "",
-            "## What a board designer can take from it", "",
-            f"* The least signal is set by the threshold while nothing is held (0.6 V, EK): requests down to {good('amplitude', 'request')},"
-            f" answers down to {good('amplitude', 'answer')}; 3 Vpp is the least legal one.",
-            "* The peak hold sees the first pulse at that lower threshold, so all later pulses look late: up to about 0.5 us on"
-            " a clean line. The late window (1.5 us) is for this; a lower first threshold costs margin there.",
-            f"* White noise at 3 Vpp: good up to {good('white_3v')} rms behind the band pass. Filter: 7 kHz to 1 MHz (two poles), EK.",
-            f"* A continuous 100 kHz sine at 3 Vpp: good up to {good('sine_3v')} amplitude. The 30 % rule is about lone"
-            f" interference, which holds ({good('ghost')} of the amplitude); a sine moves the pulses as well.",
-            f"* DC steps: good up to {good('dip')} at 20 us; 50 Hz up to {good('mains')}. A higher corner of the high pass helps"
-            " both and costs signal.",
-            f"* Capacitance is the enemy of the line: {good('capacitance')} more at the far end is the most (suppressors,"
-            " filters of other devices); an undamped decoupling network rings"
-            f" (good up to {good('damping')} in place of 78 Ohm).",
-            f"* Clock error is no problem: {good('fast')} fast, {good('slow')} slow, against 1000 ppm. Jitter: +-{good('jitter')}.",
-            f"* Repeaters that re-time do not add up; those that do not lose about 0.35 us of window each"
-            f" (good up to {good('repeaters_raw') or '0'}).", "",
-            "## One parameter at a time", "",
-            f"Nominal: 100 m straight line, 31 slaves, 60 mA, threshold 50 %, no disturbance; {data['telegrams_per_point']} exchanges per"
-            " value. Request: at the far slave (14 bits). Answer: at the master (7 bits). Dotted: limits.", "",
-            f"![failed telegrams over each parameter]({links[0]})", "", *_table(sweep_head, sweep_table), "",
-            f"Where the limits come from: {where_from}. \"none\" under \"first error\": no error up to the end of the sweep.", "",
-            "## All at once (Monte Carlo)", "",
-            f"{legal['samples']} installations per population, {data['exchanges_per_sample']} exchanges on each. Random tree, cable,"
-            " power unit and stations anywhere, up to 62 slaves, up to two repeaters, senders 55..68 mA and +-1000 ppm, thresholds"
-            " 45..55 %. *legal*: disturbances together below 0.45 V (30 % of the weakest legal pulse). *stress*: up to 3 V, jitter up"
-            " to 1 us, later pulses 40..140 % of the first, foreign pulses.", "",
-            *_table(["Population", "Direction", "Telegrams", "Failed", "Accepted", "Accepted wrong", "Bound (95 %)",
-                     "Classes of the failed"], mc_rows(data)), "",
-            "Bound: upper 95 % confidence bound (Clopper-Pearson) of the probability that a telegram is accepted wrongly, for this"
-            " population, telegrams taken as independent.", "",
-            (f"Under stress {wrong} of {telegrams} telegrams were accepted with wrong content, all with disturbances above"
-             f" {least_wrong:g} V peak: two bits changed, which parity does not see. The line code cannot exclude it; the"
-             " receiver's checks make it rare." if wrong else
-             f"Under stress none of {telegrams} telegrams was accepted with wrong content."), "",
-            *_table(["Disturbances, sum of peaks", "Telegrams", "Failed", "Accepted wrong"], [
-                [f"{population}: {b['from_v']:g}..{b['to_v']:g} V", str(b["telegrams"]), str(b["failed"]), str(b["wrong"])]
-                for population in ("legal", "stress") for b in data["monte_carlo"][population]["by_disturbance"]]), "",
-            f"Pulse starts on the legal line: {legal['early_ns']:+.0f} to {legal['late_ns']:+.0f} ns (windows -875 to +1500 ns).", "",
-            f"![earliest and latest pulses]({links[1]})", "",
-            "## The model", "",
-            f"![an answer at the master]({links[2]})", "",
-            "* **Senders**: current edges `t/T - sin(2 pi t/T)/(2 pi)`, T = 3 us, 55..68 mA (EK).",
-            "* **Line**: tree of lumped sections of at most 5 m (10 m in the Monte Carlo); data decoupling 100 uH parallel 78 Ohm"
-            " (EK), the power unit an AC short; slaves 13.5 kOhm, 13 mH, 30 pF (data sheet). R' 20..90 mOhm/m, C' 30..80 pF/m,"
-            " L' 0.4..1.3 uH/m, G' up to 5 uS/m (EK).",
-            "* **Time**: exact state transition at 7.8 ns with the current linear within a step; edges are superposed on that grid.",
-            "* **Front end**: one-pole high pass 7 kHz, two-pole low pass 1 MHz (EK); threshold 0.6 V until the first negative"
-            " pulse, then 45..55 % of its peak, followed for 2.5 us (EK); hysteresis 5 % (EK); cleared after 9 us without a pulse (EK).",
-            "* **Repeaters**: own receiver, 2..5 us delay, pulses leave on the 3 us grid of the first one (EK).",
-            "* **Not in it**: saturation and clipping, common mode, temperature, the shaper's own errors, a slave's own receiver"
-            " (the chip's receiver with 14 bits stands in for it).", "",
-            "Against ngspice (sections of 1 m there), stored waveforms in `sim/line/reference`; `python -m sim.line.spice` runs it again:", "",
-            *_table(["Network", "At", "Largest difference", "of the amplitude", "rms"], _spice_rows())]
-    (folder / "margins.md").write_text("\n".join(line.rstrip() for line in text) + "\n")
+    plots = {what: images / f"margins_{what}.svg" for what in ("sweeps", "windows", "wave")}
+    plot_sweeps(data, plots["sweeps"])
+    plot_windows(data, plots["windows"])
+    plot_wave(plots["wave"])
+    fields: dict[str, Any] = {f"{what}_svg": os.path.relpath(path, folder) for what, path in plots.items()}
+    for entry in data["sweeps"]:
+        rising = entry["points"][-1]["value"] > entry["points"][0]["value"]
+        good = [entry[w]["last_good"] for w in WAYS]
+        both = None if None in good else min(good) if rising else max(good)
+        for name, value in ((entry["name"], both), *((f"{entry['name']}_{w}", v) for w, v in zip(WAYS, good))):
+            fields[name] = "no value" if value is None else f"{value:g} {entry['unit']}".strip()
+    head = ["Parameter", "Limit (request / answer)", "Request: last good", "first error", "Answer: last good",
+            "first error", "Limit kept"]
+    rows = [[r[0], r[1], *r[2].split(" | "), *r[3].split(" | "), r[4]] for r in sweep_rows(data)]
+    legal = data["monte_carlo"]["legal"]
+    fields.update(
+        {k: data[k] for k in ("command", "date", "seconds", "seed")}, telegrams=data["telegrams_per_point"],
+        samples=legal["samples"], exchanges=data["exchanges_per_sample"], early=f"{legal['early_ns']:+.0f}",
+        late=f"{legal['late_ns']:+.0f}", wrong=_wrong(data), sweep_table="\n".join(_table(head, rows)),
+        sources="\n".join(f"* {e['title']}: {e['source']}" for e in data["sweeps"] if e["source"]),
+        mc_table="\n".join(_table(["Population", "Direction", "Telegrams", "Failed", "Accepted", "Accepted wrong",
+                                   "Bound (95 %)", "Classes of the failed"], mc_rows(data))),
+        disturbance_table="\n".join(_table(["Disturbances, sum of peaks", "Telegrams", "Failed", "Accepted wrong"], [
+            [f"{population}: {b['from_v']:g}..{b['to_v']:g} V", str(b["telegrams"]), str(b["failed"]), str(b["wrong"])]
+            for population in data["monte_carlo"] for b in data["monte_carlo"][population]["by_disturbance"]])),
+        spice_table="\n".join(_table(["Network", "At", "Largest difference", "of the amplitude", "rms"],
+                                      _spice_rows())))
+    (folder / "margins.md").write_text(TEXT.format_map(fields))

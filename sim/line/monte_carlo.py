@@ -138,5 +138,6 @@ def summary(samples: list[Sample]) -> dict[str, Any]:
                       "wrong_bound": upper_bound(found["WRONG"], telegrams)}
     out["early_ns"] = min((s.early_ns for s in samples), default=0.0)
     out["late_ns"] = max((s.late_ns for s in samples), default=0.0)
-    out["wrong"] = [{"sample": s.number, "direction": w, "sent": a, "accepted": b} for s in samples for w, a, b in s.wrong]
+    out["wrong"] = [{"sample": s.number, "direction": where, "sent": sent, "accepted": accepted}
+                    for s in samples for where, sent, accepted in s.wrong]
     return out

@@ -69,7 +69,7 @@ def netlist(case: Case, output: str) -> str:
         caps[node] += load.farad
         siemens[node] += 1 / load.ohm if load.ohm else 0.0
         if load.henry:
-            lines.append(f"Ll{k} {node} lr{k} {load.henry:.9g}\nRl{k} lr{k} 0 1m")   # ngspice wants no loop of inductors
+            lines.append(f"Ll{k} {node} lr{k} {load.henry:.9g}\nRl{k} lr{k} 0 1m")   # no loop of inductors
     lines += [f"Lp {seg.power} pr {seg.decoupling_h:.9g}", "Rps pr 0 1m", f"Rp {seg.power} 0 {seg.decoupling_ohm:.9g}"]
     for node in caps:
         lines += [f"C_{node} {node} 0 {caps[node]:.9g}"]
@@ -150,8 +150,8 @@ def decimated(volts: np.ndarray) -> np.ndarray:
 def write_reference(case: Case, volts: np.ndarray) -> Path:
     REFERENCE.mkdir(exist_ok=True)
     path = REFERENCE / f"{case.name}.csv"
-    rows = [f"# SPDX-License-Identifier: Apache-2.0\n# ngspice, {case.name}: {case.bits}-bit telegram 0x{case.word:04X} "
-            f"from {case.sender}, {AMPS * 1e3:.0f} mA; mV every {REFERENCE_NS:.0f} ns", ",".join(case.probes)]
+    rows = ["# SPDX-License-Identifier: Apache-2.0",
+            f"# ngspice, {case.name}: {case.bits}-bit telegram 0x{case.word:04X} from {case.sender}, {AMPS * 1e3:.0f} mA; mV every {REFERENCE_NS:.0f} ns", ",".join(case.probes)]
     rows += [",".join(f"{1e3 * v:.1f}" for v in row) for row in decimated(volts).T]
     path.write_text("\n".join(rows) + "\n")
     return path

@@ -70,9 +70,10 @@ def _range(first: float, last: float, step: float) -> tuple[float, ...]:
     return tuple(round(float(v), 6) for v in np.arange(first, last + step / 2, step))
 
 
+PPM = (0, 1000, 2000, 4000, 6000, 8000, 10000, 12000, 14000, 16000, 18000, 20000, 25000, 30000, 35000, 40000, 45000)
 SWEEPS = (
-    Sweep("amplitude", "amplitude at the receiver", "Vpp", (8, 6, 5, 4, 3, 2.5, 2.2, 2, 1.9, 1.8, 1.7, 1.6, 1.5, 1.4, 1.3,
-          1.2, 1.1, 1), lambda v: at_vpp(NOMINAL, v), 3, 3, "3..8 Vpp, receiver ICs"),
+    Sweep("amplitude", "amplitude at the receiver", "Vpp",
+          (8, 6, 5, 4, 3, 2.5, 2.2, 2, 1.9, 1.8, 1.7, 1.6, 1.5, 1.4, 1.3, 1.2, 1.1, 1), lambda v: at_vpp(NOMINAL, v), 3, 3, "3..8 Vpp, receiver ICs"),
     Sweep("later", "pulses after the first, relative to it", "%", _range(100, 30, -5),
           lambda v: _senders(later_gain=v / 100), 80, 60, "must detect, field rule"),
     Sweep("ghost", "foreign pulse inside the telegram, relative to its amplitude", "%", _range(0, 100, 5),
@@ -94,19 +95,19 @@ SWEEPS = (
     Sweep("burst", "300 kHz bursts at 3 Vpp, one per telegram, peak on the line", "V", _range(0, 3, 0.15),
           lambda v: _disturbed(3, burst_v=v, burst_per_ms=10)),
     Sweep("dip", "DC dip at 3 Vpp, time constant 20 us", "V", _range(0, 5, 0.25), lambda v: _disturbed(3, dip_v=v)),
-    Sweep("fast", "clock of the sender, fast", "ppm", (0, 1000, 2000, 4000, 6000, 8000, 10000, 12000, 14000, 16000, 18000,
-          20000, 25000, 30000, 35000, 40000, 45000), lambda v: _senders(ppm=v), 1000, 1000, "P_CLK_PPM (EK)"),
-    Sweep("slow", "clock of the sender, slow", "ppm", (0, 1000, 2000, 4000, 6000, 8000, 10000, 12000, 14000, 16000, 18000,
-          20000, 25000, 30000, 35000, 40000, 45000), lambda v: _senders(ppm=-v), 1000, 1000, "P_CLK_PPM (EK)"),
+    Sweep("fast", "clock of the sender, fast", "ppm", PPM, lambda v: _senders(ppm=v), 1000, 1000, "P_CLK_PPM (EK)"),
+    Sweep("slow", "clock of the sender, slow", "ppm", PPM, lambda v: _senders(ppm=-v), 1000, 1000, "P_CLK_PPM (EK)"),
     Sweep("jitter", "jitter of each edge, +-", "ns", _range(0, 1300, 50), lambda v: _senders(jitter_ns=v)),
-    Sweep("length", "length of the line", "m", (10, 50, 100, 150, 200, 250, 300, 350, 400, 450, 500),
+    Sweep("length", "length of the line", "m",
+          (10, 50, 100, 125, 150, 175, 200, 225, 250, 275, 300, 350, 400, 450, 500),
           lambda v: _line(metres=v, longest_m=500), 100, 100, "one segment"),
     Sweep("slaves", "slaves on 100 m", "", (1, 16, 31, 62, 93, 124, 186, 248, 310),
           lambda v: Setup((Hop(replace(bus(), loads=(("master", SLAVE), *(
               (f"n{1 + k % 30}" if k else "far", SLAVE) for k in range(int(v)))))),)), 62, 62, "62 slaves"),
     Sweep("cable_l", "inductance of the cable, C' 60 pF/m", "uH/m", _range(0.4, 4, 0.3),
           lambda v: _line(cable=Cable(l=v * 1e-6)), 1.3, 1.3, "EK range"),
-    Sweep("capacitance", "extra capacitance at the far end", "nF", (0, 1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30, 40),
+    Sweep("capacitance", "extra capacitance at the far end", "nF",
+          (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 15, 20, 25, 30, 40),
           _extra_capacitance),
     Sweep("damping", "resistance across the decoupling", "Ohm", (78, 100, 150, 200, 300, 400, 600, 1000, 2000, 10000),
           lambda v: _line(decoupling_ohm=v)),
