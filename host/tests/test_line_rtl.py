@@ -266,7 +266,8 @@ def test_margins_page(tmp_path):
     found = {**monte_carlo.summary(part), "extremes_ns": [[s.early_ns, s.late_ns] for s in part],
              "by_disturbance": margins.by_disturbance(part)}
     data = {"date": "2026-01-01", "seconds": 1, "seed": 1, "command": "x", "telegrams_per_point": 2,
-            "exchanges_per_sample": 16, "sweeps": [{"name": s.name, "title": s.title, "unit": s.unit, "source": s.source, "points": points,
+            "exchanges_per_sample": 16,
+            "sweeps": [{"name": s.name, "title": s.title, "unit": s.unit, "source": s.source, "points": points,
                         "limits": {"request": None, "answer": None}, "request": way, "answer": way}
                        for s in sweeps.SWEEPS], "monte_carlo": {"legal": found, "stress": found}}
     write_page(data, tmp_path, tmp_path / "images")

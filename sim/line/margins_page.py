@@ -119,8 +119,9 @@ Simulated, not measured on hardware. EK marks constants that are engineering kno
 
 Made by `{command}` on {date} ({seconds} s).
 Plots, tables and all counts as JSON: `build/margins`. One Monte Carlo sample again:
-`make margins ARGS='--sample legal:7'`. On a cluster: `make margins SCHEDULER=tcp://host:8786`; its workers start in the same checkout (shared or copied) with
-the receiver library built and `PYTHONPATH=.:host/python`. This page: `make margins ARGS=--docs`.
+`make margins ARGS='--sample legal:7'`. On a cluster: `make margins SCHEDULER=tcp://host:8786`; its workers
+start in the same checkout (shared or copied) with the receiver library built and `PYTHONPATH=.:host/python`.
+This page: `make margins ARGS=--docs`.
 
 ## What a board designer can take from it
 

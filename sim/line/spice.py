@@ -151,7 +151,8 @@ def write_reference(case: Case, volts: np.ndarray) -> Path:
     REFERENCE.mkdir(exist_ok=True)
     path = REFERENCE / f"{case.name}.csv"
     rows = ["# SPDX-License-Identifier: Apache-2.0",
-            f"# ngspice, {case.name}: {case.bits}-bit telegram 0x{case.word:04X} from {case.sender}, {AMPS * 1e3:.0f} mA; mV every {REFERENCE_NS:.0f} ns", ",".join(case.probes)]
+            f"# ngspice, {case.name}: {case.bits}-bit telegram 0x{case.word:04X} from {case.sender}, "
+            f"{AMPS * 1e3:.0f} mA; mV every {REFERENCE_NS:.0f} ns", ",".join(case.probes)]
     rows += [",".join(f"{1e3 * v:.1f}" for v in row) for row in decimated(volts).T]
     path.write_text("\n".join(rows) + "\n")
     return path

@@ -73,7 +73,8 @@ def _range(first: float, last: float, step: float) -> tuple[float, ...]:
 PPM = (0, 1000, 2000, 4000, 6000, 8000, 10000, 12000, 14000, 16000, 18000, 20000, 25000, 30000, 35000, 40000, 45000)
 SWEEPS = (
     Sweep("amplitude", "amplitude at the receiver", "Vpp",
-          (8, 6, 5, 4, 3, 2.5, 2.2, 2, 1.9, 1.8, 1.7, 1.6, 1.5, 1.4, 1.3, 1.2, 1.1, 1), lambda v: at_vpp(NOMINAL, v), 3, 3, "3..8 Vpp, receiver ICs"),
+          (8, 6, 5, 4, 3, 2.5, 2.2, 2, 1.9, 1.8, 1.7, 1.6, 1.5, 1.4, 1.3, 1.2, 1.1, 1),
+          lambda v: at_vpp(NOMINAL, v), 3, 3, "3..8 Vpp, receiver ICs"),
     Sweep("later", "pulses after the first, relative to it", "%", _range(100, 30, -5),
           lambda v: _senders(later_gain=v / 100), 80, 60, "must detect, field rule"),
     Sweep("ghost", "foreign pulse inside the telegram, relative to its amplitude", "%", _range(0, 100, 5),
