@@ -117,7 +117,7 @@ Where telegrams begin to fail when line, senders, front end and disturbances lea
 of the line with the real receiver RTL (`rtl/phy/asi_rx.sv` and its filter, Verilated) behind its comparators.
 Simulated, not measured on hardware. EK marks constants that are engineering knowledge, not from a public source.
 
-Made by `{command}` on {date} ({seconds} s).
+Made by `{command}` on {date}.
 Plots, tables and all counts as JSON: `build/margins`. One Monte Carlo sample again:
 `make margins ARGS='--sample legal:7'`. On a cluster: `make margins SCHEDULER=tcp://host:8786`; its workers
 start in the same checkout (shared or copied) with the receiver library built and `PYTHONPATH=.:host/python`.
@@ -187,8 +187,8 @@ Pulse starts of accepted telegrams on the legal lines: {early} to {late} ns (win
   L' 0.4..1.3 uH/m, G' up to 5 uS/m (EK), impedance 80..120 Ohm.
 * **Time**: exact state transition at 7.8 ns, the current linear within a step; edges are superposed on that grid.
 * **Front end**: high pass 7 kHz (one pole), low pass 1 MHz (two poles) (EK); threshold 0.6 V until the first negative
-  pulse, then 45..55 % of its peak, followed for 2.5 us (EK); hysteresis 5 % (EK); cleared after 9 us without a pulse
-  (EK).
+  pulse, then 45..55 % of its peak, followed for 2.5 us (EK); hysteresis 5 % (EK); cleared when both comparators were
+  silent for 9 us (EK).
 * **Repeaters**: own receiver, 2..5 us of delay, pulses leave on the 3 us grid of the first one (EK).
 * **Not in it**: saturation and clipping, common mode, temperature, the shaper's own errors, a slave's own receiver (the
   chip's receiver with 14 bits stands in for it).
@@ -233,7 +233,7 @@ def write_page(data: dict[str, Any], folder: Path, images: Path) -> None:
     rows = [[r[0], r[1], *r[2].split(" | "), *r[3].split(" | "), r[4]] for r in sweep_rows(data)]
     legal = data["monte_carlo"]["legal"]
     fields.update(
-        {k: data[k] for k in ("command", "date", "seconds", "seed")}, telegrams=data["telegrams_per_point"],
+        {k: data[k] for k in ("command", "date", "seed")}, telegrams=data["telegrams_per_point"],
         samples=legal["samples"], exchanges=data["exchanges_per_sample"], early=f"{legal['early_ns']:+.0f}",
         late=f"{legal['late_ns']:+.0f}", wrong=_wrong(data), sweep_table="\n".join(_table(head, rows)),
         sources="\n".join(f"* {e['title']}: {e['source']}" for e in data["sweeps"] if e["source"]),
