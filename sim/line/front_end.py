@@ -12,8 +12,9 @@ import numpy as np
 from .network import CLOCK_S, BandPass
 
 CLOCK_NS = CLOCK_S * 1e9
-QUIET_NS = 9_000.0       # comparators silent this long = a pause: the peak hold is cleared (rx_vth_clear_o). EK; longer
-                         # than the longest distance inside a telegram (6 us and windows), shorter than P_RX_OPEN
+QUIET_NS = 9_000.0       # comparators silent this long = a pause: the peak hold is empty again. EK; longer than any
+                         # distance inside a telegram (6 us and windows), shorter than P_RX_OPEN, and about when the
+                         # chip's rx_vth_clear_o ends (P_PAUSE + P_VTH_CLEAR after the last accepted pulse)
 
 
 @dataclass(frozen=True)

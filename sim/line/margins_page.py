@@ -188,7 +188,7 @@ Pulse starts of accepted telegrams on the legal lines: {early} to {late} ns (win
 * **Time**: exact state transition at 7.8 ns, the current linear within a step; edges are superposed on that grid.
 * **Front end**: high pass 7 kHz (one pole), low pass 1 MHz (two poles) (EK); threshold 0.6 V until the first negative
   pulse, then 45..55 % of its peak, followed for 2.5 us (EK); hysteresis 5 % (EK); cleared when both comparators were
-  silent for 9 us (EK).
+  silent for 9 us (EK), about when the chip ends its clear pulse (P_PAUSE 7.5 us and P_VTH_CLEAR 2 us after a pulse).
 * **Repeaters**: own receiver, 2..5 us of delay, pulses leave on the 3 us grid of the first one (EK).
 * **Not in it**: saturation and clipping, common mode, temperature, the shaper's own errors, a slave's own receiver (the
   chip's receiver with 14 bits stands in for it).
