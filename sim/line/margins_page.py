@@ -140,8 +140,8 @@ This page: `make margins ARGS=--docs`.
 * **Capacitance and damping.** {capacitance} of additional capacitance at the far end is the most (suppressors and
   filters of all devices together); decoupling without its resistors rings: {damping} in place of 78 Ohm still works.
 * **Clock and jitter.** {fast} fast and {slow} slow are good, against a required 1000 ppm; so is jitter of +-{jitter}.
-* **Repeaters** that re-time do not add up; those that do not cost late window each, and more than
-  {repeaters_raw} in series fail.
+* **Repeaters** that re-time cost delay only: {repeaters} in series are good, then the answer comes after P_RX_TIMEOUT.
+  Those that do not re-time cost late window each; {repeaters_raw} in series are good.
 
 ## One parameter at a time
 
