@@ -73,6 +73,16 @@ include firmware/firmware.mk
 # ---------------------------------------------------------------- native simulation
 include tb/tb.mk
 
+# ---------------------------------------------------------------- margins of the analog line
+$(VENV)/.margins: requirements-margins.txt $(VENV)/.ready
+	@$(VPY) -m pip install --quiet --disable-pip-version-check -r requirements-margins.txt
+	@touch $@
+
+# one thread per process: Dask brings the processes
+.PHONY: margins
+margins: $(VENV)/.margins $(BUILD)/tb/libasi_line_rx.so  ## where telegrams begin to fail on the line (minutes); SCHEDULER=tcp://..., ARGS='--samples N'
+	@OPENBLAS_NUM_THREADS=1 $(VPY) -m sim.line.margins $(if $(SCHEDULER),--scheduler $(SCHEDULER)) $(ARGS)
+
 # ---------------------------------------------------------------- clean
 .PHONY: clean
 clean:  ## remove build results, keep the environment

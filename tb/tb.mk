@@ -3,6 +3,7 @@
 #   build/tb/libasi_slaves.so       no Verilator in it
 #   build/tb/libasi_chip.so         whole chip, as fast as it gets
 #   build/tb/libasi_chip_trace.so   the same with waves (FST where the headers of lz4 and zlib are found, else VCD)
+#   build/tb/libasi_line_rx.so      the receivers alone, behind comparator levels, for the analog line model (sim/line)
 TB_OUT     := $(BUILD)/tb
 TB_CXX     ?= $(CXX)
 TB_FLAGS   := -std=c++20 -O3 -fPIC -Wall -Wextra -Werror
@@ -15,7 +16,7 @@ $(TB_OUT)/libasi_slaves.so: $(TB_SLAVES) $(TB_HEADERS)
 	@echo "building $@"
 	@$(TB_CXX) $(TB_FLAGS) -shared $(TB_SLAVES) -o $@
 
-pytest test: $(addprefix $(TB_OUT)/,libasi_slaves.so libasi_chip.so libasi_chip_trace.so)
+pytest test: $(addprefix $(TB_OUT)/,libasi_slaves.so libasi_chip.so libasi_chip_trace.so libasi_line_rx.so)
 
 # ---------------------------------------------------------------- whole chip
 # The firmware is not in the model: the image is loaded when a chip is made (+firmware=, FirmwareHex).
@@ -60,3 +61,18 @@ $(TB_OUT)/libasi_chip_trace.so: $(TB_OUT)/model_$(TB_WAVE)/unit.cpp $(TB_VRT) $(
                                 tb/asi_chip.cpp $(TB_SLAVES) $(TB_HEADERS)
 	@echo "building $@"
 	@$(TB_CHIP) -DVM_TRACE=1 $(if $(TB_FST),-DVM_TRACE_FST=1 -lz -llz4,-DVM_TRACE_VCD=1)
+
+# ---------------------------------------------------------------- receivers behind comparator levels
+TB_RX_SV := $(addprefix $(CURDIR)/,rtl/generated/asi_map_pkg.sv rtl/phy/asi_timing_pkg.sv rtl/phy/asi_sync.sv \
+              rtl/phy/asi_pulse_filter.sv rtl/phy/asi_rx.sv tb/asi_line_rx.sv)
+
+# PINMISSING: outputs of asi_rx that the line model has no use for
+$(TB_OUT)/model_rx/unit.cpp: $(TB_RX_SV) tools/lint.vlt tb/tb.mk $(VENV)/.ready
+	@rm -rf $(@D) && mkdir -p $(@D)
+	@verilator --quiet-stats --cc --top-module asi_line_rx --prefix Vasi_line_rx -O3 --x-assign fast --x-initial fast \
+	  --noassert --timescale 1ns/1ps --flatten -Wno-PINMISSING $(CURDIR)/tools/lint.vlt $(TB_RX_SV) -Mdir $(@D)
+	@{ ls $(@D) | grep '^Vasi_line_rx.*\.cpp$$' | sed 's/.*/#include <&>/'; echo '#include "asi_line_rx.cpp"'; } > $@
+
+$(TB_OUT)/libasi_line_rx.so: $(TB_OUT)/model_rx/unit.cpp $(TB_VRT) tb/asi_line_rx.cpp tb/asi_line_rx.h
+	@echo "building $@"
+	@$(TB_CXX) $(TB_FLAGS) -isystem $(<D) $(TB_ISYS) -Itb -shared $< $(filter %.o,$^) -o $@ -pthread
