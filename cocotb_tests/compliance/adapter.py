@@ -32,7 +32,7 @@ class AsiXact:
         self.rx = {1: dut.rx_p, -1: dut.rx_n}  # inputs of the device: pulses of slaves and disturbances
         self.man, self.en, self.stalled = dut.tx_man, dut.tx_en, dut.stalled
         self.result_signal = dut.res_number    # changes with each result
-        self._go = 0
+        self._go = int(dut.go.value)
 
     def inputs(self, **values):
         for name, value in values.items():

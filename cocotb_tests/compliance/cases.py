@@ -96,8 +96,12 @@ class Maker:
         case = Case(f"{self.group.ident}-{number:03}", title, tuple(rules.split(", ")) if rules else self.group.rules,
                     call, steps, **fields)
         for step in steps:
-            heard = step.pins + (self.own(call, step.echo) if step.echo is not None else [])
+            heard = step.pins if case.kind != "idle" else []   # those of idle are over when the request starts
+            heard = heard + (self.own(call, step.echo) if step.echo is not None else [])
             case.outcomes.append(oracle.attempt(self.times, heard, call, case.no_reply))
+            times = [time for time, _ in oracle.filtered(self.times, heard)]
+            if len(set(times)) < len(times):  # both comparators in one clock: no rule says which pulse comes first
+                case.also = (ALTERNATION, TIMING, START)
         self.cases.append(case)
 
     def train(self, title: str, pulses, delay=SYNC, want=None, width=None, **fields) -> None:
@@ -353,11 +357,10 @@ def extra_pulses(m):
 @group("C-BOT", "RX-003, RX-008")
 def both_lines(m):
     """Both comparators at once: never a good answer; which check names it is open"""
-    every = (ALTERNATION, TIMING, START)
     for data in (0, 3, 6, 15):
         pulses = m.word(answer_word(data))
         for index, (time, sign) in enumerate(pulses):
-            m.train(f"answer {data:X}, both lines at pulse {index + 1}", [*pulses, (time, -sign)], also=every)
+            m.train(f"answer {data:X}, both lines at pulse {index + 1}", [*pulses, (time, -sign)])
 
 
 # --------------------------------------------------------------------------------------------- filter
@@ -398,7 +401,7 @@ def glitches(m):
                     continue
     for width in (t.filter - 1, t.filter):
         m.add(f"both lines {width} clocks while nothing answers", [(t.us(30), -1, width), (t.us(30), 1, width)],
-              want=NO_RESPONSE if width < t.filter else None, also=(START, TIMING, ALTERNATION))
+              want=NO_RESPONSE if width < t.filter else None)
     for width in (1.25, 1.5, 2, 2.25):
         m.train(f"answer 4 of pulses of {width} us", m.word(answer_word(4)), width=m.us(width), want=OK)
     for width in (0.75, 0.875, 1.5, 2, 2.25):
@@ -464,8 +467,7 @@ def two_slaves(m):
         for one, two in ((5, 5), (0, 0), (15, 15), (0, 15), (3, 12), (6, 9), (1, 2), (7, 8), (10, 5), (15, 0)):
             try:
                 m.add(f"answers {one:X} and {two:X}, the second {shift} clocks later",
-                      m.answer(one) + m.pins(m.word(answer_word(two)), t.us(SYNC) + shift), also=(
-                          (ALTERNATION, TIMING, START) if shift == 0 and one != two else ()))
+                      m.answer(one) + m.pins(m.word(answer_word(two)), t.us(SYNC) + shift))
             except Ambiguous:
                 continue
 
@@ -577,7 +579,9 @@ def babble(m):
     """A line that never gets quiet: the next request comes after 1 ms"""
     for period in (5, 10, 15, 20, 23):
         for name, first in (("from the answer on", SYNC), ("from before the window on", 10)):
-            pulses = [(m.us(first + period * k), 1 if k % 2 else -1) for k in range(int(1100 / period))]
+            decided = first + 43.5 if first == SYNC else first
+            count = int((decided + 1000 - 2 - first) / period) + 1   # none in the clocks before the next request
+            pulses = [(m.us(first + period * k), 1 if k % 2 else -1) for k in range(count)]
             m.add(f"a pulse each {period} us {name}", m.pins(pulses))
 
 
@@ -587,7 +591,7 @@ def idle(m):
     for noise in ((), (10,), (59,), (10, 50), (30, 60, 90), (5, 25, 45, 65), (58, 116)):
         for sign in (-1, 1):
             m.add(f"pulses {noise} us after the start", [(m.us(at), sign * (1 if k % 2 else -1), m.us(1))
-                                                         for k, at in enumerate(noise)], kind="idle")
+                                                         for k, at in enumerate(noise)], kind="idle", want=NO_RESPONSE)
 
 
 @group("C-ABO", "LT-011")
