@@ -548,29 +548,28 @@ def gaps(m):
         for move in (-t.early, -1, 1, t.late):
             pulses = m.word(answer_word(data))
             m.train(f"answer {data:X}, end pulse moved by {move} clocks", _moved(pulses, len(pulses) - 1, move), want=OK)
-    kinds = (("good", m.answer(5), SYNC + 36), ("parity", m.pins(m.word("0010011"), m.us(SYNC)), SYNC + 36),
-             ("silence", [], 48), ("early", m.pins([(m.us(10), -1)]), 4),
+    kinds = (("good", m.answer(5), SYNC + 36), ("parity", m.pins(m.word("0010001"), m.us(SYNC)), SYNC + 36),
+             ("silence", [], 53.5), ("early", m.pins([(m.us(10), -1)]), 10),
              ("length", m.answer(5) + m.pins([(m.us(SYNC + 40), -1)]), SYNC + 40),
-             ("one pulse", m.pins([(m.us(SYNC), -1)]), SYNC + 36), ("late", m.answer(3, 70), 70 + 36))
+             ("one pulse", m.pins([(m.us(SYNC), -1)]), SYNC + 20), ("late", m.answer(3, 70), 70 + 36))
     for name, pins, last in kinds:
         for after in (10, 12, 14, 16, 16.5, 17):
-            if after < 8 + (name == "silence") * 10:
-                continue
             for sign in (-1, 1):
                 m.add(f"{name}, {'+' if sign > 0 else '-'} {after} us later", pins + m.pins([(m.us(last + after), sign)]))
         m.add(f"{name}, then four pulses 20 us apart",
               pins + m.pins([(m.us(last + 14 + 20 * k), 1 if k % 2 else -1) for k in range(4)]))
         m.add(f"{name}, then an answer of somebody", pins + m.answer(8, last + 15))
     for after in (20, 22, 23):
-        m.add(f"parity, - {after} us later", [*m.pins(m.word("0010011"), m.us(SYNC)),
+        m.add(f"parity, - {after} us later", [*m.pins(m.word("0010001"), m.us(SYNC)),
                                              (m.us(SYNC + 36 + after - 1), -1, m.us(1))])
 
 
 @group("C-LAT", "LT-009")
 def late_requests(m):
     """Requests offered after the gap: the whole lead of tx_en"""
+    m.add("offered in the gap", m.answer(1), want=OK)
     for at in (0.5, 1, 5, 20, 100, 333):
-        for pins in ([], m.answer(1), m.pins(m.word("0010011"), m.us(SYNC))):
+        for pins in ([], m.answer(1), m.pins(m.word("0010001"), m.us(SYNC))):
             m.add(f"offered {at} us after the gap", pins, kind="late", at=m.us(at))
 
 

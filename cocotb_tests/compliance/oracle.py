@@ -165,6 +165,8 @@ def attempt(times: Times, pins: list[tuple[int, int, int]], call: int, no_reply:
             if time > start[0] - times.us(1.25):
                 raise Ambiguous(f"a pulse {start[0] - time} clocks before the next request: too late to hold it back")
             start = (time + times.gap_err,) * 2
+        else:
+            raise Ambiguous("a pulse after the next request has begun")
     if babble_from is not None and start[0] > babble_from + times.babble:
         start = (babble_from + times.babble, babble_from + times.babble + times.us(1) + times.act)
     if not good:

@@ -54,18 +54,22 @@ class Bench:
         self.stalled = False
         self.count = 0
         self.enabled_at = None
+        self.task = None            # drives what goes on beside the case
 
     # ------------------------------------------------------------------------------------ watching
     async def start(self):
         """Reset, watchers, enable."""
         self.adapter.echo(0)
-        self.adapter.inputs(rx_p=0, rx_n=0)
-        await self._reset()
+        await self.reset()
         for task in (self._watch_man, self._watch_enable, self._watch_results, self._watch_stall):
             cocotb.start_soon(task())
 
-    async def _reset(self):
+    async def reset(self):
+        """Device and bench as at the start."""
         self.following = None
+        if self.task is not None:
+            self.task.cancel()
+            self.task = None
         self.adapter.reset(1)
         self.adapter.enable(0)
         for pin in self.adapter.rx.values():
@@ -74,7 +78,7 @@ class Bench:
         self.adapter.reset(0)
         self.adapter.enable(1)
         self.requests, self.results, self.expect, self.offered, self.stalled = [], [], None, None, False
-        self.enabled_at = None
+        self.count, self.enabled_at = 0, None
 
     async def _watch_man(self):
         man, change, cell = self.adapter.man, ValueChange(self.adapter.man), self.times.us(80)
@@ -255,7 +259,7 @@ class Bench:
 
     async def _abort(self, case, request, last):
         t = self.times
-        cocotb.start_soon(self._drive(case.steps[0].pins, last))
+        self.task = cocotb.start_soon(self._drive(case.steps[0].pins, last))
         self.following = self.next_case
         await until(last + case.at)
         if self.results:
@@ -287,8 +291,7 @@ class Bench:
             except Failed as error:
                 failed.append((case if case is not closing else previous, str(error)))
                 if not stop_first:
-                    await self._reset()
-                    self.count = 0
+                    await self.reset()
                     case = None   # its gap is not measured
             if failed and stop_first:
                 break

@@ -89,3 +89,25 @@ def run(dut: str, hz: int, *, groups=None, stop=False, verilog=None, quiet=True,
     return {"dut": dut, "mhz": hz // 10**6, "seconds": round(time.monotonic() - begin, 1),
             "junit": str(build / f"{MODULE}.xml"), "error": error, "log": str(log) if log else None,
             "groups": {g: rows[g] for g in GROUPS if g in rows}}
+
+
+def run_mutants(hz: int, count: int, seed: int = 1, quiet=True) -> dict:
+    """-> {"killed", "mutants": [{"mutant", "change", "killed_by", ...}], "seconds"}: all in one build and one run."""
+    name = f"compliance-mutants-{hz // 10**6}"
+    out = ROOT / "build/cocotb" / name / "results"
+    out.mkdir(parents=True, exist_ok=True)
+    begin = time.monotonic()
+    with output_to(ROOT / "build/compliance" / f"{name}.log" if quiet else None):
+        verilog, changes = netlist.mutants(hz, count, seed)
+        env = {"ASI_COMPLIANCE_HZ": str(hz), "ASI_COMPLIANCE_OUT": str(out),
+               "ASI_COMPLIANCE_MUTANTS": str(len(changes))}
+        (out / "mutants.json").unlink(missing_ok=True)
+        run_cocotb("tb_compliance", [verilog, *BENCH], "cocotb_tests.compliance.cocotb_mutants", name=name, quick=True,
+                   parameters={"ClkHz": hz}, env=env, extra_args=[
+                       str(HERE / "public.vlt"), *FAST, str(HERE / "netlist.vlt"), "-Wno-UNOPTFLAT", "-DNETLIST",
+                       "-DMUTANTS"])
+    rows = json.loads((out / "mutants.json").read_text())
+    for row, change in zip(rows, changes):
+        row["change"] = change.removeprefix("mutate ")
+    return {"mhz": hz // 10**6, "seed": seed, "killed": sum(row["killed_by"] is not None for row in rows),
+            "seconds": round(time.monotonic() - begin, 1), "mutants": rows}
