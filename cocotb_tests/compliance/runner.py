@@ -130,9 +130,12 @@ class Bench:
         self.offered, self.following = case, None
 
     async def _wait(self, condition, what):
+        requests = len(self.requests)
         while not condition():
             if self.stalled:
                 raise Failed(f"{what}: nothing in 3 ms")
+            if len(self.requests) > requests + 1:   # a device that sends for ever
+                raise Failed(f"{what}, but requests")
             self.wake.clear()
             await self.wake.wait()
 
