@@ -40,6 +40,6 @@ async def mutants(dut):
         failed = await bench.run(cases, stop_first=True)
         rows.append({"mutant": number, "killed_by": failed[0][0].ident if failed else None,
                      "reason": failed[0][1][:300] if failed else None, "seconds": round(time.monotonic() - begin, 2)})
+        Path(os.environ["ASI_COMPLIANCE_OUT"], "mutants.json").write_text(json.dumps(rows, indent=1) + "\n")
         bench.adapter.mutant(0)
         await bench.reset()
-    Path(os.environ["ASI_COMPLIANCE_OUT"], "mutants.json").write_text(json.dumps(rows, indent=1) + "\n")

@@ -62,5 +62,5 @@ def mutants(hz: int, count: int, seed: int = 1) -> tuple[Path, list[str]]:
     lines = (ROOT / OUT / f"{name}.txt").read_text().splitlines()
     applied = "".join(f"{line.replace('mutate', f'mutate -ctrl mutant {MUTANT_BITS} {k}', 1)}\n"
                       for k, line in enumerate(lines, 1))
-    yosys(f"read_rtlil {base}\n{applied}write_verilog -noattr {OUT}/{name}.v\n", name)
+    yosys(f"read_rtlil {base}\n{applied}write_verilog -noattr -noparallelcase {OUT}/{name}.v\n", name)
     return ROOT / OUT / f"{name}.v", lines
