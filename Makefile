@@ -62,6 +62,13 @@ lint: $(VENV)/.ready  ## Verilator -Wall over the whole chip, three parameter se
 synth: $(VENV)/.synth $(BUILD)/firmware/boot.hex  ## cells and MHz on UP5K and ECP5 (minutes); build/synth/numbers.json
 	@$(VPY) syn/synth.py --vexriscv $(VEXRISCV) --out $(BUILD)/synth $(ARGS)
 
+# ---------------------------------------------------------------- line-level compliance (docs/compliance.md)
+DUT ?= all
+$(if $(filter rtl netlist all,$(DUT)),,$(error DUT=$(DUT): must be rtl, netlist or all))
+.PHONY: compliance
+compliance: $(VENV)/$(if $(filter rtl,$(DUT)),.ready,.synth)  ## line-level suite on RTL and netlist: make compliance DUT=rtl|netlist|all
+	@$(VPY) -m cocotb_tests.compliance --dut $(DUT) $(ARGS)
+
 # ---------------------------------------------------------------- proofs
 .PHONY: formal
 formal: $(VENV)/.synth  ## prove the small blocks with SymbiYosys and z3 (docs/formal.md); ARGS='asi_rx' for one
