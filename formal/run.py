@@ -46,11 +46,14 @@ TARGETS = (
     Target("asi_tx", (TIMES, "rtl/phy/asi_tx.sv"), (("prove", 3), ("cover", 62)), "full, 8 MHz; covers: 0.25 us grid",
            "TL-001, TL-003..TL-005, LT-001, LT-009"),
     Target("asi_rx", (MAP, TIMES, "rtl/phy/asi_rx.sv", "formal/asi_rx_spec.sv"), (("prove", 3), ("cover", 62)),
-           "full, 8 MHz; covers: 0.5 us grid", "RX-001..RX-008, RX-010"),
+           "full, 8 MHz; covers: 0.5 us grid", "RX-001..RX-008, RX-010, RX-015"),
+    Target("asi_rx14", (MAP, TIMES, "rtl/phy/asi_rx.sv", "formal/asi_rx_spec.sv", "formal/asi_rx_fv.sv"),
+           (("prove", 3), ("cover", 118)), "full, 8 MHz; covers: 0.5 us grid",
+           "RX-001..RX-008, RX-010, RX-014, RX-015"),
     Target("asi_dpm", (MAP, "rtl/dpm/asi_dpm.sv", "formal/asi_ram_fv.sv"), (("prove", 5), ("cover", 12)),
            "any one word of 4096", "HW-001, HW-005, HW-006"),
     Target("asi_xact", (MAP, TIMES, SYNC, FILTER, "rtl/phy/asi_tx.sv", "rtl/phy/asi_rx.sv", "rtl/phy/asi_xact.sv"),
-           (("prove", 3),), "full, 8 MHz", "LT-003..LT-008, LT-011"),
+           (("prove", 3),), "full, 8 MHz", "LT-003..LT-008, LT-011, RX-014, ST-001, ST-003"),
 )
 
 

@@ -496,8 +496,8 @@ async def stopped_idle(dut):
 
 @cocotb.test(timeout_time=20, timeout_unit="ms")
 async def offered_later(dut):
-    """LT-004, LT-009: a request offered within the gap starts when the gap ends, one offered after it when P_TX_BIAS has
-    passed; a foreign pulse on the idle line still costs 24 us of quiet."""
+    """LT-004, LT-009: a request offered within the gap starts when the gap ends, one offered after it when P_TX_BIAS
+    has passed; a foreign pulse on the idle line still costs 24 us of quiet."""
     tb = TB(dut)
     await tb.start()
     tb.offer()
@@ -554,8 +554,8 @@ async def babble(dut):
 
 @cocotb.test(timeout_time=40, timeout_unit="ms")
 async def babble_interrupted(dut):
-    """LT-007, LT-008: enable off for one clock ends the wait of a babbling line, whenever it comes: the next request has
-    its 1 ms again. One clock near the end of the wait was once enough to start it at once."""
+    """LT-007, LT-008: enable off for one clock ends the wait of a babbling line, whenever it comes: the next request
+    has its 1 ms again. One clock near the end of the wait was once enough to start it at once."""
     tb = TB(dut)
     await tb.start(enable=0)
 

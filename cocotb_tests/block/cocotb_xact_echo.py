@@ -71,7 +71,8 @@ def damages(tb):
         cases[f"extra at {t}"] = sorted([*train, (t, 1)])
     # another comparator in the window of a pulse, and a pair that keeps the alternation
     cases["extra in a window"] = sorted([*train, (times[4] + tb.us(1), -train[4][1])])
-    cases["extra pair"] = sorted([*train, (times[4] + tb.us(0.75), -train[4][1]), (times[4] + tb.us(1.875), train[4][1])])
+    cases["extra pair"] = sorted([*train, *((times[4] + tb.us(t), sign * train[4][1]) for t, sign in ((0.75, -1),
+                                                                                                      (1.875, 1)))])
     cases["both missing"] = [p for n, p in enumerate(train) if n not in (6, 7)]
     # legal requests that differ in one payload bit, and so in parity too, or in two
     for bit in range(11):
@@ -192,8 +193,8 @@ async def early(dut):
 
 @cocotb.test(timeout_time=20, timeout_unit="ms")
 async def repeated(dut):
-    """RX-014, LT-012: a request that came back bad is repeated like any failure; the good answer to it is not taken, and
-    each repetition is judged anew. One report per attempt."""
+    """RX-014, LT-012: a request that came back bad is repeated like any failure; the good answer to it is not taken,
+    and each repetition is judged anew. One report per attempt."""
     tb = EchoTB(dut)
     await tb.start()
     for pattern, answers in (([BAD, OK], [OK, OK]), ([BAD, BAD], [OK, OK]), ([BAD, NONE], [NONE, NONE]),
@@ -236,8 +237,8 @@ async def broadcast(dut):
 
 @cocotb.test(timeout_time=20, timeout_unit="ms")
 async def attempts(dut):
-    """ST-001, RX-014: one report for each attempt, with its class, in the clock of the decision; the index is that of the
-    request (number + 32 * Sel)."""
+    """ST-001, RX-014: one report for each attempt, with its class, in the clock of the decision; the index is that of
+    the request (number + 32 * Sel)."""
     tb = EchoTB(dut)
     await tb.start()
     for error in (OK, NONE, EARLY, ErrorClass.START, ErrorClass.ALTERNATION, ErrorClass.TIMING,
