@@ -54,6 +54,12 @@ TARGETS = (
            "any one word of 4096", "HW-001, HW-005, HW-006"),
     Target("asi_xact", (MAP, TIMES, SYNC, FILTER, "rtl/phy/asi_tx.sv", "rtl/phy/asi_rx.sv", "rtl/phy/asi_xact.sv"),
            (("prove", 3),), "full, 8 MHz", "LT-003..LT-008, LT-011, RX-014, ST-001, ST-003"),
+    Target("asi_shared_mem", ("rtl/soc/asi_shared_mem.sv",), (("prove", 4), ("cover", 20)), "any one word of 256",
+           "ST-004"),
+    Target("asi_stats", (MAP, "rtl/soc/asi_shared_mem.sv", "rtl/link/asi_stats.sv"), (("prove", 3), ("cover", 50)),
+           "any one word of 1024; covers: cleared", "ST-001, ST-002, ST-004, ST-005"),
+    Target("asi_monitor", (MAP, TIMES, "formal/asi_rx_any.sv", "rtl/link/asi_monitor.sv"), (("prove", 3), ("cover", 40)),
+           "8 records, 8 MHz; covers: short times", "ST-008"),
 )
 
 
