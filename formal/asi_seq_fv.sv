@@ -6,6 +6,9 @@
 // pending and a cycle runs.
 module asi_seq_fv import asi_map_pkg::*; (
   input logic        clk_i, rst_i,
+`ifdef FV_SIM
+  input logic [4:0]  n_i,
+`endif
   input logic [31:0] free_i,                   // what is read where nothing is watched
   input logic        fw_we_i, input logic [7:0] fw_addr_i, input logic [31:0] fw_data_i,
   input logic        ready_i, res_valid_i, sent_i, repeat_i,
@@ -13,11 +16,7 @@ module asi_seq_fv import asi_map_pkg::*; (
   input logic        enable_i, cycle_en_i, two_extra_i, out_hold_i, tick_us_i, batch_start_i,
   input logic [12:0] min_cycle_us_i, input logic [6:0] batch_len_i
 );
-`ifdef FV_COVER
-  localparam int Attempt = 4;
-`else
   localparam int Attempt = 400;                // clocks from a request to its repetition or result, at least
-`endif
   localparam int Retry = 1, Fail = 3;          // P_DEXG_RETRY, P_FAIL_CYCLES
   localparam int SearchMax = 328;              // clocks from an offer to the end of the search for the next slot
   localparam int QuitMax = 336, QuitBatch = 450;  // clocks from stop to idle, without an open call
@@ -47,6 +46,11 @@ module asi_seq_fv import asi_map_pkg::*; (
 
   // ------------------------------------------------------------------------------------------ link RAM
   logic [4:0]  n_q;                            // the watched number: free at the start, then constant
+`ifdef FV_SIM
+  assign n_q = n_i;
+`else
+  always_ff @(posedge clk_i) n_q <= n_q;
+`endif
   logic [1:0]  act_q, ext_q;                   // its SLOT words: [0] A, [1] B
   logic [2:0]  streak_q [2];                   // its SLOT_STATE words
   logic [31:0] mreq_q, ireq_q;                 // MGMT_REQ, INCL_REQ
@@ -71,7 +75,6 @@ module asi_seq_fv import asi_map_pkg::*; (
     if (mem_addr == MgmtRes) word[ResultTagLsb +: ResultTagW] = mres_q;
   end
   always_ff @(posedge clk_i) begin
-    n_q     <= n_q;
     rdata_q <= mem_req && !mem_we ? word : free_i;
     for (int b = 0; b < 2; b++) begin
       if (fw_slot && fw_addr_i[6:5] == 2'(b)) begin
@@ -323,7 +326,7 @@ module asi_seq_fv import asi_map_pkg::*; (
       Once1_A:    assert (!(taken && mgmt) || (mpend && !mtaken_q && {retries, no_reply, call} == mreq_q[13:0]));
       Answer_A:   assert (!mem_mres || (mpend && mem_wdata[23:16] == mreq_q[23:16] && mem_wdata[7:4] == last_q &&
                           (mtaken_q || (gone_q && last_q == ErrAborted))));
-      Waits_A:    assert (mage_q <= 2'd2);
+      Waits_A:    assert (mage_q <= 2'd1);
       Prompt_A:   assert (!(cycle_done && mbegin_q) || !(two_extra_i || mfree_q));
       // LK-008, LK-009: inclusion, and what a cycle may call
       Row_A:      assert (!(taken && mgmt && row_q) || two_extra_i);
@@ -355,7 +358,28 @@ module asi_seq_fv import asi_map_pkg::*; (
                           [OutSnap:OutSnap + 8'd7], [InWork:InWork + 8'd7], [InImg:InImg + 8'd7]});
     end
   end
-`ifndef FV_COVER
+  // what the simulation of this harness has to reach (cocotb_tests/block/test_seq_rules.py)
+  always_ff @(posedge clk_i) if (live_q && !rst_i) begin
+    Once_C:    cover (cycle_done && steady_q && exp_v_q);
+    Skipped_C: cover (cycle_done && steady_q && !exp_v_q && act_q != '0);
+    TurnB_C:   cover (taken && dexg && steady_q && n_q == pos_q && exp_b_q && callable == 2'b11);
+    Sel_C:     cover (taken && dexg && steady_q && n_q == pos_q && ext_q[exp_b_q] && call[3]);
+    Change_C:  cover (cycle_done && !steady_q && calls_q != '0);
+    OneLost_C: cover (lost && steady_q && dut.cur_q[4:0] == n_q);
+    Longest_C: cover (mem_mres && mage_q == 2'd1);
+    Refused_C: cover (st == StPick && dut.do_incl && dut.pend_q);
+    InclMax_C: cover (st == StPick && dut.do_incl && iage_q == 2'd2);
+    Prompt_C:  cover (cycle_done && mfree_q && xm_q);
+    Both_C:    cover (cycle_done && ibegin_q && two_extra_i && xm_q);
+    Gone_C:    cover (mem_mres && gone_q);
+    Aborted_C: cover (mem_mres && mtaken_q && last_q == ErrAborted);
+    Offer_C:   cover (dut.timed_q && dut.valid_q && dut.since_q >= 33);
+    Quit_C:    cover (quit_q >= 10'd100 && cycle_busy && dut.state_d == StIdle);
+    QuitB_C:   cover (quit_q >= 10'd440 && batch_busy && dut.state_d == StIdle);
+    Paced_C:   cover (begun && !idle_q && same_q && min_cycle_us_i >= 13'd300 &&
+                      us_q <= 14'(min_cycle_us_i) + 14'd2);
+    Again_C:   cover (repeat_i && dexg && call[9:5] == n_q);
+  end
   // ------------------------------------------------------------------------------------------ for the induction
   always_ff @(posedge clk_i) if (live_q) begin
     Known_I:    assert (st <= StPace);
@@ -389,10 +413,8 @@ module asi_seq_fv import asi_map_pkg::*; (
     SearchT_I:  assert (!(dut.open_q && st inside {StScan, StCopy}) || int'(age_q) + scan_left +
                         (st == StCopy ? 16 - int'(dut.cnt_q) : 0) <= SearchMax);
     SentAge_I:  assert (!(line_q && st inside {StScan, StCopy}) || sent_age_q <= age_q);
-    SentAt_I:   assert (!(line_q && dut.sent_q && st inside {StWait, StTally}) ||
-                        int'(sent_age_q) <= SearchMax + 4);
-    AgainAt_I:  assert (!(line_q && dut.again_q && st inside {StWait, StTally}) ||
-                        int'(sent_age_q) <= SearchMax + 8);
+    SentAt_I:   assert (!(line_q && (dut.sent_q || dut.again_q) && st inside {StWait, StTally}) ||
+                        int'(sent_age_q) <= SearchMax + 1 + (dut.sent_q ? 0 : 2) + int'(st == StTally));
     Offer_I:    assert (!dut.timed_q || int'(dut.since_q) <= offer_at);
     OfferAt_I:  assert (!dut.timed_q || dut.valid_q || (!(st inside {StScan, StTally}) &&
                         (!dut.first_q || st inside {StFetch, StLoad, StMgmtReq, StMgmtRes, StIncl, StPick}) &&
@@ -460,16 +482,15 @@ module asi_seq_fv import asi_map_pkg::*; (
     Incl_I:     assert (!(incl && (dut.open_q || st == StResWr)) || (dut.tag_q == ipick_q[23:16] && (!dut.valid_q ||
                         ({dut.retries_q, dut.no_reply_q, dut.call_q} == ipick_q[13:0] && ipick_q[31]))));
     Answered_I: assert (!(mgmt && st inside {StFailRd, StFailWr, StIncl, StPick}) ||
-                        (st == StPick || !mpend) && (st == StFailRd || mage_q == '0));
+                        (!mpend && (st == StFailRd || mage_q == '0)));
     Picked_I:   assert (picked_q == (extra && (mgmt || incl || st inside {StCopy, StCycRd, StCycWr})));
-    MageA_I:    assert (!(mage_q == 2'd2 && mpend && !picked_q) || !dut.was_mgmt_q);
-    MageB_I:    assert (!(mage_q != '0 && mpend && picked_q && !mgmt_open) || (mage_q == 2'd1 && !dut.was_mgmt_q));
-    Mage_I:     assert (mage_q <= 2'd2);
+    MageA_I:    assert (!(mage_q != '0 && mpend && !picked_q) || !dut.was_mgmt_q);
+    MageB_I:    assert (!(mpend && picked_q && !mgmt_open) || (!dut.was_mgmt_q && mage_q == '0));
     MageC_I:    assert (!(mage_q != '0 && !mpend) || (mgmt && st == StFailRd));
     IageA_I:    assert (!(iage_q == 2'd2) || dut.was_mgmt_q);
     IageB_I:    assert (!(iage_q != '0 && picked_q) || (dut.was_mgmt_q && (two_extra_i ? mgmt_on : iage_q == 2'd1)) ||
                         !ivalid);
-    Was_I:      assert (!mgmt_on || dut.was_mgmt_q);
+    Was_I:      assert ((!mgmt_on || dut.was_mgmt_q) && (!picked_q || mgmt || !dut.was_mgmt_q));
     Row_I:      assert (!row_q || (dut.was_mgmt_q && !(mgmt && dut.valid_q) && (ivalid || !mem_req_q)));
     Mbegin_I:   assert (!(cyc_q && picked_q && mbegin_q && !mgmt_open && !(mgmt && st == StFailRd)) ||
                         (!two_extra_i && !mfree_q && mpend));
@@ -490,5 +511,4 @@ module asi_seq_fv import asi_map_pkg::*; (
     Us_I:       assert (idle_q || us_q[13] || dut.us_q == us_q[12:0]);
     Paced_I:    assert (idle_q || !dut.paced_q || !same_q || us_q >= 14'(min_q));
   end
-`endif
 endmodule
