@@ -7,6 +7,7 @@ misses the clock rate of the default configuration (16 MHz).
 """
 import argparse
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -50,6 +51,10 @@ def run(command, log):
 def sources():
     lines = (line.split("//")[0].strip() for line in Path("rtl/asi_master.f").read_text().splitlines())
     return [f"rtl/{line}" for line in lines if line]
+
+
+def sources_of(*parts):
+    return [path for path in sources() if any(part in path for part in parts)]
 
 
 def count(stat, prefix):
@@ -98,6 +103,17 @@ def block_numbers(out, vexriscv):
     return result
 
 
+def line_layer(out):
+    """Cells of transmitter, receiver, sequencer and counters (syn/line_layer.sv) on the UP5K, packed, not placed."""
+    part = PARTS["up5k"]
+    stat = synthesise("up5k", "line_layer", out, [*sources_of("phy/", "link/", "asi_map_pkg"), "syn/line_layer.sv"], {},
+                      part["synth"])
+    log = f"{out}/up5k-line_layer-pack.log"
+    run([*part["place"], "--json", f"{out}/up5k-line_layer.json", "--pack-only"], log)
+    cells = int(re.search(r"ICESTORM_LC:\s*(\d+)/", Path(log).read_text()).group(1))
+    return {"cells": cells, "lut4": count(stat, "SB_LUT4"), "ff": count(stat, "SB_DFF")}
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--vexriscv", required=True, help="VexRiscv_Min.v")
@@ -115,6 +131,7 @@ def main():
     result = {"tools": {tool: version(tool) for tool in TOOLS}, "configurations": {}}
     for key in args.part or PARTS:
         result["configurations"][key] = part_numbers(key, args.out, vexriscv, args.boot_rom)
+    result["line_layer_up5k"] = line_layer(args.out)
     if args.blocks:
         result["blocks_up5k"] = block_numbers(args.out, vexriscv)
     (out / "numbers.json").write_text(json.dumps(result, indent=2) + "\n")
@@ -122,6 +139,8 @@ def main():
     print("| Part | Cells | LUT4 | FF | BRAM | SPRAM | Fmax MHz |\n|---|---|---|---|---|---|---|")
     for row in result["configurations"].values():
         print("| {part} | {cells} of {cells_available} | {lut4} | {ff} | {bram} | {spram} | {fmax_mhz} |".format(**row))
+    print("line layer (transmitter, receiver, sequencer, counters), UP5K: {cells} cells, {lut4} LUT4, {ff} FF".format(
+        **result["line_layer_up5k"]))
     for block, row in result.get("blocks_up5k", {}).items():
         print(f"  {block:16} {row['lut4']:5} LUT4 {row['ff']:5} FF (alone, UP5K)")
     print(", ".join(f"{tool} {number}" for tool, number in result["tools"].items()))
