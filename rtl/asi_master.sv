@@ -7,7 +7,12 @@ module asi_master #(
   parameter              BootRomHex    = "",          // $readmemh of the boot ROM
   parameter bit          BootFromFlash = 1'b0,        // 0: start at RAM address 0; 1: start in the boot ROM
   parameter int unsigned RamWords      = 16384,       // program RAM in 32-bit words, a power of two, 4096..16384
+  parameter bit          ReadBack      = 1'b1,        // own requests must come back on rx_p_i, rx_n_i (RX-014)
   // the line, in ns; what each one means: rtl/phy/asi_timing_pkg.sv
+  parameter int unsigned WinEarlyNs    = asi_timing_pkg::WinEarlyNs,
+  parameter int unsigned WinLateNs     = asi_timing_pkg::WinLateNs,
+  parameter int unsigned FilterNs      = asi_timing_pkg::FilterNs,
+  parameter int unsigned EchoMaxNs     = asi_timing_pkg::EchoMaxNs,
   parameter int unsigned RxOpenNs      = asi_timing_pkg::RxOpenNs,
   parameter int unsigned RxTimeoutNs   = asi_timing_pkg::RxTimeoutNs,
   parameter int unsigned GapOkNs       = asi_timing_pkg::GapOkNs,
@@ -116,7 +121,8 @@ module asi_master #(
   );
 
   asi_xact #(
-    .ClkHz(ClkHz), .RxOpenNs(RxOpenNs), .RxTimeoutNs(RxTimeoutNs), .GapOkNs(GapOkNs), .GapNorspNs(GapNorspNs),
+    .ClkHz(ClkHz), .ReadBack(ReadBack), .WinEarlyNs(WinEarlyNs), .WinLateNs(WinLateNs), .FilterNs(FilterNs),
+    .EchoMaxNs(EchoMaxNs), .RxOpenNs(RxOpenNs), .RxTimeoutNs(RxTimeoutNs), .GapOkNs(GapOkNs), .GapNorspNs(GapNorspNs),
     .GapErrNs(GapErrNs), .BabbleMaxNs(BabbleMaxNs), .IdleStartNs(IdleStartNs), .TxBiasNs(TxBiasNs)
   ) u_xact (
     .clk_i, .rst_i, .enable_i(enable),
@@ -154,7 +160,10 @@ module asi_master #(
     .mem_rdata_i(stat_rdata)
   );
 
-  asi_monitor #(.ClkHz(ClkHz), .RxOpenNs(RxOpenNs), .RxTimeoutNs(RxTimeoutNs)) u_monitor (
+  asi_monitor #(
+    .ClkHz(ClkHz), .WinEarlyNs(WinEarlyNs), .WinLateNs(WinLateNs), .FilterNs(FilterNs),
+    .RxOpenNs(RxOpenNs), .RxTimeoutNs(RxTimeoutNs)
+  ) u_monitor (
     .clk_i, .rst_i, .n_start_i(pulse_n), .p_start_i(pulse_p), .enable_i(mon_enable), .clear_i(mon_clear),
     .tail_i(mon_tail), .head_o(mon_head), .lost_o(mon_lost),
     .mem_req_o(ring_req), .mem_we_o(ring_we), .mem_addr_o(ring_addr), .mem_wdata_o(ring_wdata)
