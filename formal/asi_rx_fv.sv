@@ -75,8 +75,6 @@ module asi_rx_fv import asi_map_pkg::*; #(parameter int Bits = 7) (input logic c
     assume (rst_i == init_q && (en_i || (busy && t == TimeW'(3))) && !(n_i && p_i));
     assume (!(n_i || p_i) || !busy || (t[1:0] == 2'd0 && int'(t) <= (End + 1) * Half) || t == TimeW'(6) ||
             t == TimeW'(7));
-    if (Bits > 7) assume (!busy || int'(t) < 3 * Half || int'(t) >= 15 * Half ||  // the middle of a request is 0101..
-                          {n_i, p_i} == {t[3:0] == 4'd0, t[3:0] == 4'd8});
 `endif
     if (!rst_i) begin
       Good_C:      cover (done && cls == ErrOk && data[3:0] == 4'd9 && dev == '0);

@@ -4,8 +4,8 @@
 // answer whose quiet has passed before its decision (one pulse, say) it starts two clocks after the decision;
 // LT-007: a babbling line delays it at most P_BABBLE_MAX; LT-011: nothing starts while disabled,
 // an open call ends at once; one result per request taken, with its repetitions;
-// RX-014: an attempt is BAD_MASTER exactly when the second receiver did not say, in time, that the call taken came back;
-// its verdict follows the rules for what came after the own first edge: asi_rx14_fv;
+// RX-014: an attempt is BAD_MASTER exactly when the second receiver did not say, in time, that the call taken came
+// back; its verdict follows the rules for what came after the own first edge: asi_rx14_fv;
 // ST-001, ST-003: one report per attempt that ends, none when aborted or a broadcast, with index, repetition, end and
 // delay.
 module asi_xact_fv import asi_map_pkg::*; (
@@ -33,7 +33,8 @@ module asi_xact_fv import asi_map_pkg::*; (
     .res_valid_o(res), .res_last_o(last), .res_first_o(first), .res_data_o(data), .res_repeats_o(repeats),
     .sent_o(sent), .repeat_o(repeated), .att_valid_o(att), .att_index_o(att_index), .att_class_o(att_class),
     .att_repeat_o(att_repeat), .att_final_o(att_final), .att_delay_o(att_delay), .att_dev_o(att_dev),
-    .att_dev_late_o(att_late), .pulse_n_o(strobe_n), .pulse_p_o(strobe_p), .rx_p_i, .rx_n_i, .tx_man_o(man), .tx_en_o(en)
+    .att_dev_late_o(att_late), .pulse_n_o(strobe_n), .pulse_p_o(strobe_p), .rx_p_i, .rx_n_i, .tx_man_o(man),
+    .tx_en_o(en)
   );
 
   typedef enum logic [1:0] {GapIsIdle, GapIsOk, GapIsNorsp, GapIsErr} gap_e;
