@@ -29,7 +29,7 @@ module asi_seq_fv import asi_map_pkg::*; (
     InclRes = 8'(LinkInclRes / 4), Sent = 8'(LinkSent / 4), OutSnap = 8'(LinkOutSnap / 4),
     InWork = 8'(LinkInWork / 4), InImg = 8'(LinkInImg / 4);
 
-  logic        mem_req, mem_we, req_valid, no_reply, batch_busy, cycle_busy, batch_done, cycle_done, lost, sync;
+  logic        mem_req, mem_we, req_valid, no_reply, sel, batch_busy, cycle_busy, batch_done, cycle_done, lost, sync;
   logic [7:0]  mem_addr;
   logic [31:0] mem_wdata, rdata_q;
   logic [10:0] call;
@@ -38,7 +38,8 @@ module asi_seq_fv import asi_map_pkg::*; (
   asi_seq #(.DexgRetry(Retry), .FailCycles(Fail)) dut (
     .clk_i, .rst_i, .mem_req_o(mem_req), .mem_we_o(mem_we), .mem_addr_o(mem_addr), .mem_wdata_o(mem_wdata),
     .mem_rdata_i(rdata_q), .req_valid_o(req_valid), .req_ready_i(ready_i), .req_call_o(call),
-    .req_retries_o(retries), .req_no_reply_o(no_reply), .res_valid_i, .res_last_i, .res_first_i, .res_data_i,
+    .req_retries_o(retries), .req_no_reply_o(no_reply), .req_sel_o(sel),
+    .res_valid_i, .res_last_i, .res_first_i, .res_data_i,
     .res_repeats_i, .sent_i, .repeat_i, .enable_i, .cycle_en_i, .two_extra_i, .out_hold_i, .min_cycle_us_i,
     .tick_us_i, .batch_start_i, .batch_len_i, .batch_busy_o(batch_busy), .cycle_busy_o(cycle_busy),
     .batch_done_o(batch_done), .cycle_done_o(cycle_done), .slave_lost_o(lost), .slot_phase_o(phase), .sync_o(sync)
@@ -117,7 +118,7 @@ module asi_seq_fv import asi_map_pkg::*; (
   logic        two_q, busy_q;
   logic [31:0] ipick_q;                        // INCL_REQ as it was picked
   logic [3:0]  last_q;                         // the result
-  logic [16:0] held, held_q;                   // the request
+  logic [17:0] held, held_q;                   // the request
   logic        offered_q;
   logic [9:0]  quit_q;
   logic [6:0]  done_q, len_q;                  // batch
@@ -129,7 +130,7 @@ module asi_seq_fv import asi_map_pkg::*; (
   assign mem_state = mem_req && mem_we && mem_addr[7:6] == State[7:6];
   assign mem_mres  = mem_req && mem_we && mem_addr == MgmtRes;
   assign mem_ires  = mem_req && mem_we && mem_addr == InclRes;
-  assign held      = {call, retries, no_reply, phase};
+  assign held      = {call, sel, retries, no_reply, phase};
   assign st       = dut.state_q;
   assign dexg     = dut.kind_q == KindDexg;
   assign mgmt     = dut.kind_q == KindMgmt;
@@ -309,7 +310,7 @@ module asi_seq_fv import asi_map_pkg::*; (
       Rising_A:   assert (!(taken && dexg) || (call[9:5] > prev_q && call[10] == 1'b0 && call[4] == 1'b0));
       Twice_A:    assert (!(taken && dexg && call[9:5] == n_q) || calls_q == '0);
       Turn_A:     assert (!(taken && dexg && call[9:5] == n_q && steady_q) ||
-                          (exp_v_q && dut.cur_q == {exp_b_q, n_q}));
+                          (exp_v_q && sel == exp_b_q));
       Sel_A:      assert (!(taken && dexg && call[9:5] == n_q && steady_q && ext_q[exp_b_q]) || call[3] == !exp_b_q);
       Once_A:     assert (!(cycle_done && steady_q) || calls_q == 2'(exp_v_q));
       Retry_A:    assert (!(taken && dexg) || (retries == 2'(Retry) && !no_reply));
@@ -323,7 +324,7 @@ module asi_seq_fv import asi_map_pkg::*; (
                           lost == (!(last_q inside {ErrOk, ErrAborted}) && streak_q[dut.cur_q[5]] == 3'(Fail)));
       LostAt_A:   assert (!lost || st == StInWr);
       // LK-016: management
-      Once1_A:    assert (!(taken && mgmt) || (mpend && !mtaken_q && {retries, no_reply, call} == mreq_q[13:0]));
+      Once1_A:    assert (!(taken && mgmt) || (mpend && !mtaken_q && {sel, retries, no_reply, call} == mreq_q[14:0]));
       Answer_A:   assert (!mem_mres || (mpend && mem_wdata[23:16] == mreq_q[23:16] && mem_wdata[7:4] == last_q &&
                           (mtaken_q || (gone_q && last_q == ErrAborted))));
       Waits_A:    assert (mage_q <= 2'd1);
@@ -335,7 +336,7 @@ module asi_seq_fv import asi_map_pkg::*; (
       OneSlot_A:  assert (!(cycle_done && ibegin_q) || xi_q || xm_q);
       Mgmt_A:     assert (!(taken && mgmt) || (!xm_q && !xi_q));
       Incl_A:     assert (!(taken && incl) || (!xi_q && (!xm_q || two_extra_i) && ipick_q[RequestValidLsb] &&
-                          {retries, no_reply, call} == ipick_q[13:0]));
+                          {sel, retries, no_reply, call} == ipick_q[14:0]));
       InclRes_A:  assert (!mem_ires || mem_wdata[23:16] == ipick_q[23:16]);
       Last_A:     assert (!(taken && dexg) || (!xm_q && !xi_q));
       Phase_A:    assert (!(taken && cycle_busy) || phase == (mgmt ? PhaseManagement : incl ? PhaseInclusion :
@@ -362,7 +363,7 @@ module asi_seq_fv import asi_map_pkg::*; (
   always_ff @(posedge clk_i) if (live_q && !rst_i) begin
     Once_C:    cover (cycle_done && steady_q && exp_v_q);
     Skipped_C: cover (cycle_done && steady_q && !exp_v_q && act_q != '0);
-    TurnB_C:   cover (taken && dexg && steady_q && n_q == pos_q && exp_b_q && callable == 2'b11);
+    TurnB_C:   cover (taken && dexg && steady_q && n_q == pos_q && sel && callable == 2'b11);
     Sel_C:     cover (taken && dexg && steady_q && n_q == pos_q && ext_q[exp_b_q] && call[3]);
     Change_C:  cover (cycle_done && !steady_q && calls_q != '0);
     OneLost_C: cover (lost && steady_q && dut.cur_q[4:0] == n_q);
@@ -376,7 +377,7 @@ module asi_seq_fv import asi_map_pkg::*; (
     Offer_C:   cover (dut.timed_q && dut.valid_q && dut.since_q >= 33);
     Quit_C:    cover (quit_q >= 10'd100 && cycle_busy && dut.state_d == StIdle);
     QuitB_C:   cover (quit_q >= 10'd440 && batch_busy && dut.state_d == StIdle);
-    Paced_C:   cover (begun && !idle_q && same_q && min_cycle_us_i >= 13'd300 &&
+    Paced_C:   cover (begun && !idle_q && same_q && min_cycle_us_i >= 13'd200 &&
                       us_q <= 14'(min_cycle_us_i) + 14'd2);
     Again_C:   cover (repeat_i && dexg && call[9:5] == n_q);
   end
@@ -454,7 +455,8 @@ module asi_seq_fv import asi_map_pkg::*; (
     Cur_I:      assert (!(dexg && (dut.open_q || st inside {StStateRd, StResWr}) && pos_q == n_q) ||
                         ((!quiet_q[1] || callable[dut.cur_q[5]]) && (!quiet_q[2] || dut.cur_q[5] == now_b)));
     Pos_I:      assert (!(dexg && (dut.open_q || books)) || (dut.cur_q[4:0] == pos_q && pos_q != '0));
-    Call_I:     assert (!(dexg && dut.open_q) || (dut.call_q[9:5] == pos_q && !dut.call_q[10] && !dut.call_q[4] &&
+    Call_I:     assert (!(dexg && dut.open_q) || (dut.call_q[9:5] == pos_q && dut.sel_q == dut.cur_q[5] &&
+                        !dut.call_q[10] && !dut.call_q[4] &&
                         dut.retries_q == 2'(Retry) && !dut.no_reply_q));
     Sel_I:      assert (!(dexg && dut.valid_q && steady_q && pos_q == n_q && ext_q[dut.cur_q[5]]) ||
                         dut.call_q[3] == !dut.cur_q[5]);
@@ -472,15 +474,16 @@ module asi_seq_fv import asi_map_pkg::*; (
     // extra slots
     ReadM_I:    assert (st != StMgmtRes || rdata_q == mreq_q);
     ReadR_I:    assert (!(st == StIncl && dexg) || (dut.tag_q == mreq_q[23:16] && rdata_q[23:16] == mres_q &&
-                        {dut.retries_q, dut.no_reply_q, dut.call_q} == mreq_q[13:0]));
+                        {dut.sel_q, dut.retries_q, dut.no_reply_q, dut.call_q} == mreq_q[14:0]));
     ReadI_I:    assert (st != StPick || (rdata_q == ireq_q && (dexg ? dut.pend_q == mpend &&
-                        dut.tag_q == mreq_q[23:16] && {dut.retries_q, dut.no_reply_q, dut.call_q} == mreq_q[13:0] :
+                        dut.tag_q == mreq_q[23:16] &&
+                        {dut.sel_q, dut.retries_q, dut.no_reply_q, dut.call_q} == mreq_q[14:0] :
                         !dut.pend_q)));
     Mgmt_I:     assert (!mgmt_open || (mpend && dut.tag_q == mreq_q[23:16] && (dut.valid_q ? !mtaken_q &&
-                        {dut.retries_q, dut.no_reply_q, dut.call_q} == mreq_q[13:0] : mtaken_q || gone_q)));
+                        {dut.sel_q, dut.retries_q, dut.no_reply_q, dut.call_q} == mreq_q[14:0] : mtaken_q || gone_q)));
     Mtaken_I:   assert (!mtaken_q || mgmt_open);
     Incl_I:     assert (!(incl && (dut.open_q || st == StResWr)) || (dut.tag_q == ipick_q[23:16] && (!dut.valid_q ||
-                        ({dut.retries_q, dut.no_reply_q, dut.call_q} == ipick_q[13:0] && ipick_q[31]))));
+                        ({dut.sel_q, dut.retries_q, dut.no_reply_q, dut.call_q} == ipick_q[14:0] && ipick_q[31]))));
     Answered_I: assert (!(mgmt && st inside {StFailRd, StFailWr, StIncl, StPick}) ||
                         (!mpend && (st == StFailRd || mage_q == '0)));
     Picked_I:   assert (picked_q == (extra && (mgmt || incl || st inside {StCopy, StCycRd, StCycWr})));

@@ -2,7 +2,8 @@
 // Simulation of the proof harness of asi_seq: random inputs that keep its assumptions, so that its rules are also
 // checked over whole cycles from reset, and its covers show that the rules had something to check.
 module asi_seq_rules_tb import asi_map_pkg::*; (input logic clk_i, rst_i, input logic [4:0] n_i);
-  logic        ready_q, again_q, end_q, enable_q, run_q, two_q, hold_q, fail_q, alone_q, start_q, try_q, touch_q, slow_q, hurry_q;
+  logic        ready_q, again_q, end_q, enable_q, run_q, two_q, hold_q, fail_q, alone_q, start_q, try_q, touch_q;
+  logic        slow_q, hurry_q;
   logic [3:0]  class_q;
   logic [2:0]  tick_q;
   logic [5:0]  off_q;
@@ -42,10 +43,10 @@ module asi_seq_rules_tb import asi_map_pkg::*; (input logic clk_i, rst_i, input 
       fail_q  <= one_in(4);
       alone_q <= !one_in(4);                   // no other slot
       touch_q <= one_in(3);                    // slots are switched on and off
-      slow_q  <= one_in(5);                    // the line is slow to take a request
+      slow_q  <= one_in(3);                    // the line is slow to take a request
       hurry_q <= one_in(3);                    // one management request after the other
       len_q   <= one_in(2) ? 7'd64 : 7'($urandom_range(64));
-      min_q   <= one_in(3) ? 13'($urandom_range(900)) : '0;
+      min_q   <= one_in(2) ? 13'($urandom_range(900)) : '0;
     end
     if (rst_i || !fv.cycle_busy) two_q <= one_in(3);
     off_q    <= rst_i ? '0 : one_in(4_000) ? '1 : one_in(2_000) ? 6'd1 : off_q - 6'(off_q != '0 && one_in(16));

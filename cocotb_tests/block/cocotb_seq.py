@@ -344,7 +344,8 @@ async def lost_slave(dut):
 
 @cocotb.test(timeout_time=60, timeout_unit="ms")
 async def only_slave_lost(dut):
-    """LK-004: the only slave is lost at the end of a cycle: it is not called once more, although it was searched."""
+    """LK-004, LK-015: the only slave is lost at the end of a cycle: it is not called once more, although the search
+    found it."""
     tb = TB(dut)
     fail = tb.model.fail_cycles
     await tb.start()
@@ -660,7 +661,8 @@ async def empty_cycles(dut):
 
 @cocotb.test(timeout_time=150, timeout_unit="ms")
 async def slots_change_live(dut):
-    """LK-001: a slot switched on or off at any moment counts at the latest one cycle later; nothing else changes."""
+    """LK-001, LK-015: a slot switched on or off at any moment counts at the latest one cycle later; nothing
+    else changes."""
     tb = TB(dut)
     await tb.start()
     tb.judged = False

@@ -4,13 +4,13 @@ import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, Timer
 
-NUMBERS, CLOCKS = (1, 2, 15, 30, 31), 400_000  # numbers watched; clocks of each
+NUMBERS, CLOCKS = (1, 15, 31), 400_000  # numbers watched; clocks of each
 
 
 @cocotb.test()
 async def rules_hold(dut):
     """LK-001, LK-002, LK-004, LK-008, LK-009, LK-010, LK-013, LK-014, LK-015, LK-016, LK-017: every rule of the proof,
-    for five numbers, with firmware that writes, lines that fail and switches that fall at any clock."""
+    for three numbers, with firmware that writes, lines that fail and switches that fall at any clock."""
     for number in NUMBERS:
         dut.n_i.value = number
         dut.rst_i.value = 1
