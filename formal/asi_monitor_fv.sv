@@ -4,7 +4,11 @@
 // record is complete, its time that of its own first pulse, when head passes it; every telegram is recorded or
 // counted as lost, and a record is marked exactly when telegrams were lost right before it.
 module asi_monitor_fv #(
+`ifdef FV_COVER
+  parameter int unsigned RingW = 2
+`else
   parameter int unsigned RingW = 3
+`endif
 ) (
   input logic             clk_i, rst_i, n_i, p_i, enable_i, clear_i,
   input logic [RingW-1:0] tail_i
@@ -15,7 +19,7 @@ module asi_monitor_fv #(
   logic [RingW:0]   addr;
   logic [31:0]      wdata;
 `ifdef FV_COVER
-  asi_monitor #(.ClkHz(8_000_000), .PauseNs(125), .BadPauseNs(250), .RxOpenNs(250), .RxTimeoutNs(500), .HalfBitNs(125),
+  asi_monitor #(.ClkHz(8_000_000), .PauseNs(375), .BadPauseNs(500), .RxOpenNs(500), .RxTimeoutNs(750), .HalfBitNs(125),
                 .WinEarlyNs(0), .WinLateNs(0), .RingW(RingW)) dut (
 `else
   asi_monitor #(.ClkHz(8_000_000), .RingW(RingW)) dut (

@@ -54,7 +54,7 @@ module asi_monitor
   localparam int unsigned QuietW      = $clog2(RxTimeout + 2);
   // the last window of an answer closes here; a later pulse says that the telegram is a request
   localparam int unsigned AnswerEnd   = asi_timing_pkg::clocks(12 * HalfBitNs + WinLateNs, ClkHz);
-  localparam int unsigned AgeW        = $clog2(AnswerEnd + 2);
+  localparam int unsigned AgeW        = $clog2(AnswerEnd + asi_timing_pkg::clocks(RxQuietNs, ClkHz) + 2);
   // time stamps: 1/8 us; the counter begins so far below 0 that a strobe reads the time of its pulse
   localparam int unsigned Tick        = ClkHz / 8_000_000;
   localparam int unsigned TickW       = (Tick > 1) ? $clog2(Tick) : 1;
@@ -63,15 +63,18 @@ module asi_monitor
 
   typedef enum logic [1:0] {StSync, StIdle, StTelegram, StRequest} state_e;
   state_e            state_d, state_q;
-  logic [QuietW-1:0] quiet_d, quiet_q;     // clocks since the last pulse, stops above P_RX_TIMEOUT
-  logic [AgeW-1:0]   age_d, age_q;         // clocks since the first pulse, stops behind the end of an answer
+  logic [QuietW-1:0] quiet_d, quiet_q;     // clocks since the last pulse; wraps, so its marks are kept:
+  logic              pause_d, pause_q, hole_d, hole_q;  // the clock before the end of a pause, of the long one, or later
+  logic              open_d, open_q, over_d, over_q;    // P_RX_OPEN reached, P_RX_TIMEOUT passed
+  logic [AgeW-1:0]   age_d, age_q;         // StTelegram: clocks since the first pulse
   logic [TickW-1:0]  tick_q;
   logic [31:0]       time_q;
   logic              bad_d, bad_q;         // StSync: the long pause is needed
   logic              asked_d, asked_q;     // the last telegram was a good request
   logic              answer_d, answer_q;   // this one is the answer to it
   logic              early_d, early_q;     // ... or came before an answer may
-  logic              long_d, long_q;       // a pulse behind the end of an answer
+  logic              behind_d, behind_q;   // behind the end of an answer ...
+  logic              long_d, long_q;       // ... a pulse came
   logic [RingW-1:0]  head_d, head_q;
   logic [15:0]       lost_d, lost_q;
   logic              mark_d, mark_q;       // the next record is marked: some before it were lost
@@ -96,8 +99,8 @@ module asi_monitor
 
   // "will be over in the next clock, unless a pulse comes now": a pulse right at the end of a pause is after it
   assign pulse  = n_start_i || p_start_i;
-  assign paused = !pulse && quiet_q >= (bad_d ? QuietW'(BadPause - 1) : QuietW'(Pause - 1));
-  assign hole   = !pulse && quiet_q >= QuietW'(BadPause - 1);
+  assign hole   = !pulse && hole_q;
+  assign paused = !pulse && (bad_d ? hole_q : pause_q);
   assign listen = state_q != StSync && !(hole && state_q != StIdle && !answer_q);
   // the end of an answer; what begins later than an answer may end says that this is a request
   assign decided7 = state_q == StTelegram && done7 && (!long_d || answer_q || early_q);
@@ -107,9 +110,14 @@ module asi_monitor
     state_d  = state_q;   bad_d   = bad_q;    asked_d = asked_q;
     answer_d = answer_q;  early_d = early_q;
     record   = 1'b0;      is_request = 1'b0;  error   = class14;
-    quiet_d  = pulse ? QuietW'(1) : quiet_q + QuietW'(quiet_q <= QuietW'(RxTimeout));
-    long_d   = state_q == StTelegram && (long_q || (pulse && age_q > AgeW'(AnswerEnd)));
-    age_d    = age_q + AgeW'(age_q <= AgeW'(AnswerEnd));
+    quiet_d  = pulse ? QuietW'(1) : quiet_q + 1'b1;
+    pause_d  = !pulse && (pause_q || quiet_q == QuietW'(Pause - 2));
+    hole_d   = !pulse && (hole_q || quiet_q == QuietW'(BadPause - 2));
+    open_d   = !pulse && (open_q || quiet_q == QuietW'(RxOpen - 1));
+    over_d   = !pulse && (over_q || quiet_q == QuietW'(RxTimeout));
+    behind_d = state_q == StTelegram && (behind_q || age_q == AgeW'(AnswerEnd));
+    long_d   = state_q == StTelegram && (long_q || (pulse && behind_q));
+    age_d    = age_q + 1'b1;
     unique case (state_q)
       // StSync: waits for a pause
       StSync: begin
@@ -120,8 +128,8 @@ module asi_monitor
       StIdle: if (pulse) begin
         state_d  = StTelegram;
         age_d    = AgeW'(1);
-        early_d  = asked_q && quiet_q < QuietW'(RxOpen);
-        answer_d = asked_q && quiet_q >= QuietW'(RxOpen) && quiet_q <= QuietW'(RxTimeout);
+        early_d  = asked_q && !open_q;
+        answer_d = asked_q && open_q && !over_q;
         asked_d  = 1'b0;
       end
       // StTelegram: the first 43.5 us
@@ -192,19 +200,21 @@ module asi_monitor
     bad_q   <= rst_i || bad_d;
     asked_q <= !rst_i && asked_d;
     quiet_q <= rst_i ? '0 : quiet_d;
+    {pause_q, hole_q, open_q, over_q} <= rst_i ? '0 : {pause_d, hole_d, open_d, over_d};
     head_q  <= rst_i ? '0 : head_d;
     lost_q  <= rst_i ? '0 : lost_d;
     mark_q  <= !rst_i && mark_d;
     tick_q  <= rst_i ? TickW'(LagClocks) : (tick_q == TickW'(Tick - 1)) ? '0 : tick_q + 1'b1;
     time_q  <= rst_i ? -32'(LagTicks) : time_q + 32'(tick_q == TickW'(Tick - 1));
     // set by the first pulse, so they need no reset
+    behind_q <= behind_d;
     age_q <= age_d;  answer_q <= answer_d;  early_q <= early_d;  long_q <= long_d;
   end
 
 `ifndef SYNTHESIS
   initial begin
     ClkHz_A: assert (ClkHz >= 8_000_000 && ClkHz % 8_000_000 == 0);
-    Pause_A: assert (Pause < RxOpen && Pause < BadPause && BadPause <= RxTimeout);
+    Pause_A: assert (Pause >= 3 && Pause < RxOpen && Pause < BadPause && BadPause <= RxTimeout);
   end
   always_ff @(posedge clk_i) if (!rst_i) begin
     OneWord_A: assert (!record || !(state_q == StIdle && pulse));
