@@ -18,10 +18,10 @@ REQUEST_SHARE = 16    # payloads: this share is enough to turn every bit
 
 
 def order(groups):
-    """All cases, a spread choice of every group first. Cases that need a stop between them keep their neighbours."""
+    """All cases, a spread choice of every group first."""
     groups = {ident: cases[::REQUEST_SHARE] if ident == "C-REQ" else cases for ident, cases in groups.items()}
-    flat = [case for cases in groups.values() for case in cases]
-    return flat[::FIRST_SHARE] + [case for k, case in enumerate(flat) if k % FIRST_SHARE]
+    flat = [(case, k % FIRST_SHARE == 0) for cases in groups.values() for k, case in enumerate(cases)]
+    return [case for case, early in flat if early] + [case for case, early in flat if not early]
 
 
 @cocotb.test()
