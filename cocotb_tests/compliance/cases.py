@@ -219,6 +219,11 @@ def alternation(m):
         pulses = m.word(answer_word(data))
         for index in range(1, len(pulses)):
             m.train(f"answer {data:X}, pulse {index + 1} turned", _flipped(pulses, index), want=ALTERNATION)
+    for data in (0, 5, 14):
+        pulses = m.word(answer_word(data))
+        for index in range(1, len(pulses)):
+            m.train(f"answer {data:X}, pulse {index + 1} turned and late by a clock",
+                    _moved(_flipped(pulses, index), index, 1), want=ALTERNATION)
     for data in (0, 7, 15):
         pulses = m.word(answer_word(data))
         for index in range(1, len(pulses)):
@@ -486,6 +491,8 @@ def read_back(m):
         for index in range(len(pulses)):
             damaged(f"{call:03X}: pulse {index + 1} missing", _without(pulses, index), m.answer(index & 15), call)
             damaged(f"{call:03X}: pulse {index + 1} turned", _flipped(pulses, index), call=call)
+            damaged(f"{call:03X}: pulse {index + 1} turned and late by a clock", _moved(_flipped(pulses, index), index, 1),
+                    call=call)
     for index in range(1, 20, 3):
         damaged(f"pulses from {index + 1} on missing", m.word(request_word(RDID5))[:index], m.answer(1), RDID5)
     for bit in range(11):
