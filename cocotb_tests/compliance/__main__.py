@@ -59,8 +59,8 @@ def main() -> int:
     parser.add_argument("--mhz", type=int, action="append", help="clock, a multiple of 8 (default: 16 and 8)")
     parser.add_argument("--group", action="append", choices=list(GROUPS), help="only this group")
     parser.add_argument("--dut-verilog", type=Path, metavar="FILE",
-                        help="a netlist with the module dut_asi, or a file that stands in for the RTL file of that name; "
-                             "16 MHz, stops at the first case that fails")
+                        help="a netlist of dut_asi with its cells, or a file that stands in for the RTL file of that "
+                             "name; 16 MHz, stops at the first case that fails")
     parser.add_argument("--mutants", type=int, metavar="N", help="N mutants of the device instead of the suite")
     parser.add_argument("--seed", type=int, default=1, help="choice of the mutants")
     parser.add_argument("--verbose", action="store_true", help="output of the tools here, not in a file")

@@ -219,6 +219,11 @@ def alternation(m):
         pulses = m.word(answer_word(data))
         for index in range(1, len(pulses)):
             m.train(f"answer {data:X}, pulse {index + 1} turned", _flipped(pulses, index), want=ALTERNATION)
+    for data in (0, 5, 14):
+        pulses = m.word(answer_word(data))
+        for index in range(1, len(pulses)):
+            m.train(f"answer {data:X}, pulse {index + 1} turned and late by a clock",
+                    _moved(_flipped(pulses, index), index, 1), want=ALTERNATION)
     for data in (0, 7, 15):
         pulses = m.word(answer_word(data))
         for index in range(1, len(pulses)):
@@ -242,7 +247,8 @@ def timing(m):
                     want=TIMING)
     pulses = m.word(answer_word(3))
     m.train("E12: -21 at 19.8 us", _moved(pulses, 6, -m.us(1.25)), want=TIMING, rules="RX-003, RX-011")
-    m.train("positive end pulse 1.625 us late, parity wrong", _moved(m.word("0011011"), len(m.word("0011011")) - 1, m.us(1.625)), want=TIMING)
+    m.train("positive end pulse 1.625 us late, parity wrong", _moved(m.word("0011011"), 9, m.us(1.625)),
+            want=TIMING)
     m.train("timing before no-information: -21 early, +24 missing",
             _without(_moved(pulses, 5, -m.us(1.25)), 6, 7), want=TIMING)
 
@@ -343,7 +349,7 @@ def extra_pulses(m):
             moved = _moved(pulses, index + 1, n * t.half + m.us(1.125) - pulses[index + 1][0])
             moved = _moved(moved, index, -m.us(0.75))
             m.train(f"two pulses in window {n}, answer {data:X}", moved, width=t.filter)
-    for n in range(1, 12):   # a pair more: N P in one dead zone cannot be, so one in a dead zone, one in the next window
+    for n in range(1, 12):   # a pair more: one fits into a dead zone, the other comes in the next window
         for data, index in list(_with_window(m, n))[1:2]:
             pulses = m.word(answer_word(data))
             sign = pulses[index][1]
@@ -380,8 +386,8 @@ def glitches(m):
                   want=NO_RESPONSE if width < t.filter else START if sign > 0 else NO_INFORMATION)
             m.add(f"{'+' if sign > 0 else '-'} 750 ns {name} before the window opens", [(t.us(9), sign, width),
                   *m.answer(7)], margin=margin, want=OK if width < t.filter else EARLY)
-            m.add(f"{'+' if sign > 0 else '-'} 750 ns {name} in the gap", [*m.answer(7), (t.us(SYNC + 46), sign, width)],
-                  margin=margin, want=OK)
+            m.add(f"{'+' if sign > 0 else '-'} 750 ns {name} in the gap",
+                  [*m.answer(7), (t.us(SYNC + 46), sign, width)], margin=margin, want=OK)
             m.add(f"{'+' if sign > 0 else '-'} 750 ns {name} in the length window",
                   [*m.answer(7), (t.us(SYNC + 40), sign, width)], margin=margin,
                   want=OK if width < t.filter else LENGTH)
@@ -396,7 +402,8 @@ def glitches(m):
                 pins = m.answer(data if data is not None else 6)
                 glitch = (m.us(SYNC) + where, sign, width)
                 try:
-                    m.add(f"glitch {'+' if sign > 0 else '-'} of {width} clocks at window {n}", [*pins, glitch], want=OK)
+                    m.add(f"glitch {'+' if sign > 0 else '-'} of {width} clocks at window {n}", [*pins, glitch],
+                          want=OK)
                 except Ambiguous:
                     continue
     for width in (t.filter - 1, t.filter):
@@ -406,7 +413,8 @@ def glitches(m):
         m.train(f"answer 4 of pulses of {width} us", m.word(answer_word(4)), width=m.us(width), want=OK)
     for width in (0.75, 0.875, 1.5, 2, 2.25):
         m.add(f"own request heard as pulses of {width} us",
-              m.answer(4) + m.pins(m.word(request_word(ADRA7)), -t.request, m.us(width)), call=ADRA7, echo=None, want=OK)
+              m.answer(4) + m.pins(m.word(request_word(ADRA7)), -t.request, m.us(width)), call=ADRA7, echo=None,
+              want=OK)
 
 
 # --------------------------------------------------------------------------------------------- response window
@@ -479,13 +487,15 @@ def read_back(m):
     t = m.times
 
     def damaged(title, own, answer=(), call=E1, want=BAD_MASTER, width=None, **fields):
-        m.add(title, m.pins(own, -t.request, width) + list(answer), call=call, echo=None, want=want, needs=("read_back",),
-              **fields)
+        m.add(title, m.pins(own, -t.request, width) + list(answer), call=call, echo=None, want=want,
+              needs=("read_back",), **fields)
     for call in (E1, ADRA7):
         pulses = m.word(request_word(call))
         for index in range(len(pulses)):
             damaged(f"{call:03X}: pulse {index + 1} missing", _without(pulses, index), m.answer(index & 15), call)
             damaged(f"{call:03X}: pulse {index + 1} turned", _flipped(pulses, index), call=call)
+            damaged(f"{call:03X}: pulse {index + 1} turned and late by a clock",
+                    _moved(_flipped(pulses, index), index, 1), call=call)
     for index in range(1, 20, 3):
         damaged(f"pulses from {index + 1} on missing", m.word(request_word(RDID5))[:index], m.answer(1), RDID5)
     for bit in range(11):
@@ -547,7 +557,8 @@ def gaps(m):
     for data in (0, 1, 6, 15):
         for move in (-t.early, -1, 1, t.late):
             pulses = m.word(answer_word(data))
-            m.train(f"answer {data:X}, end pulse moved by {move} clocks", _moved(pulses, len(pulses) - 1, move), want=OK)
+            m.train(f"answer {data:X}, end pulse moved by {move} clocks", _moved(pulses, len(pulses) - 1, move),
+                    want=OK)
     kinds = (("good", m.answer(5), SYNC + 36), ("parity", m.pins(m.word("0010001"), m.us(SYNC)), SYNC + 36),
              ("silence", [], 53.5), ("early", m.pins([(m.us(10), -1)]), 10),
              ("length", m.answer(5) + m.pins([(m.us(SYNC + 40), -1)]), SYNC + 40),
@@ -555,7 +566,8 @@ def gaps(m):
     for name, pins, last in kinds:
         for after in (10, 12, 14, 16, 16.5, 17):
             for sign in (-1, 1):
-                m.add(f"{name}, {'+' if sign > 0 else '-'} {after} us later", pins + m.pins([(m.us(last + after), sign)]))
+                m.add(f"{name}, {'+' if sign > 0 else '-'} {after} us later",
+                      pins + m.pins([(m.us(last + after), sign)]))
         m.add(f"{name}, then four pulses 20 us apart",
               pins + m.pins([(m.us(last + 14 + 20 * k), 1 if k % 2 else -1) for k in range(4)]))
         m.add(f"{name}, then an answer of somebody", pins + m.answer(8, last + 15))
@@ -606,7 +618,8 @@ def _failures(m):
     word = answer_word(5)
     own = m.pins(m.word(word), m.us(SYNC))
     return {
-        NO_RESPONSE: [], START: m.pins([(0, 1)], m.us(SYNC)), ALTERNATION: m.pins(_flipped(m.word(word), 3), m.us(SYNC)),
+        NO_RESPONSE: [], START: m.pins([(0, 1)], m.us(SYNC)),
+        ALTERNATION: m.pins(_flipped(m.word(word), 3), m.us(SYNC)),
         TIMING: m.pins(_moved(m.word(word), 3, m.us(1.75)), m.us(SYNC)), NO_INFORMATION: own[:4],
         END_BIT: m.pins(m.word(word[:6] + "0"), m.us(SYNC)), PARITY: m.pins(m.word(word[:5] + "11"), m.us(SYNC)),
         LENGTH: own + m.pins([(m.us(SYNC + 39), -1)]), EARLY: m.pins([(m.us(11), -1)]),

@@ -118,7 +118,7 @@ def judge(times: Times, pulses: list[tuple[int, int]], bits: int) -> Verdict:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One attempt; times from the own last edge. The next request may start from next_lo to next_hi, exact when equal."""
+    """One attempt; times from the own last edge. The next request may start from next_lo to next_hi."""
     error: str
     data: int | None      # of a good answer
     decided: int          # earliest time at which the class can be known

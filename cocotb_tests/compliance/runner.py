@@ -12,7 +12,8 @@ import cocotb
 from cocotb.triggers import Event, Timer, ValueChange
 from cocotb.utils import get_sim_time
 
-from cocotb_tests.compliance.oracle import ABORTED, OK, Times, request_word, train
+from cocotb_tests.compliance.cases import Case, Step
+from cocotb_tests.compliance.oracle import ABORTED, OK, Outcome, Times, request_word, train
 
 _CLOCK_NS = 10  # of simulated time, whatever the clock rate: rising edge k is at 10 k + 5 ns
 
@@ -281,9 +282,9 @@ class Bench:
     async def run(self, cases, stop_first=False):
         """-> [(case, message)] of the cases that failed; stop_first: at most one."""
         failed, previous = [], None
-        closing = type(cases[0])("closing", "measures the gap of the last case", (), 0, [type(cases[0].steps[0])([], 0)])
-        closing.outcomes = [type(cases[0].outcomes[0])("NO_RESPONSE", None, self.times.timeout,
-                                                       *(self.times.timeout + self.times.gap_norsp,) * 2)]
+        end = self.times.timeout + self.times.gap_norsp
+        closing = Case("closing", "measures the gap of the last case", (), 0, [Step([], 0)],
+                       outcomes=[Outcome("NO_RESPONSE", None, self.times.timeout, end, end)])
         order = [*cases, closing]
         for case, following in zip(order, [*order[1:], None]):
             self.next_case = following if following is not None and following.kind in ("call", "abort") else None

@@ -37,7 +37,8 @@ module tb_compliance #(
   end
 
   line_echo #(.Width(ClkHz / 1_000_000)) i_echo (
-    .clk_i(clk), .rst_i(rst), .on_i(echo_on), .delay_i(echo_delay), .tx_man_i(tx_man), .echo_p_o(echo_p), .echo_n_o(echo_n)
+    .clk_i(clk), .rst_i(rst), .on_i(echo_on), .delay_i(echo_delay), .tx_man_i(tx_man), .echo_p_o(echo_p),
+    .echo_n_o(echo_n)
   );
 
   always_ff @(posedge clk) begin
