@@ -21,7 +21,7 @@ from cocotb_tests.block.phy_bench import now, start, to_clocks, until, wait
 from cocotb_tests.models.faults import Faults
 
 REQUEST_NS, ANSWER_NS, LENGTH_NS = 78_000, 36_000, 7_500
-PAUSE_NS, BAD_PAUSE_NS, OPEN_NS = 7_500, 18_000, 12_000
+PAUSE_NS, BAD_PAUSE_NS, OPEN_NS = 8_375, 18_000, 12_000
 SYNC_NS, ASYNC_NS, GAP_NS = 21_500, 33_500, 18_500
 
 
@@ -215,16 +215,17 @@ async def damaged_requests(dut):
 @cocotb.test(timeout_time=100, timeout_unit="ms")
 async def early_answers(dut):
     """ST-006, LT-002: a telegram that begins before 12 us after a good request is EARLY, at 12 us it is an answer; a
-    pulse before the pause is over (7.5 us) belongs to nothing."""
+    pulse after the decision but before the pause is over (P_PAUSE) belongs to nothing."""
     tb = await TB(dut).start()
     one = 10**9 / tb.hz
     for delay_ns, error in ((OPEN_NS, ErrorClass.OK), (OPEN_NS - one, ErrorClass.EARLY),
-                            (PAUSE_NS + one, ErrorClass.EARLY)):
+                            (PAUSE_NS, ErrorClass.EARLY)):
         at = tb.clocks(REQUEST_NS) + round(delay_ns * tb.hz / 10**9)
         begin, records = await tb.hear(tb.request(0x155) + tb.answer(6, at))
         same(records, [tb.good(begin, 0, True, 0x155), Record(tb.time(begin + at), False, error, None)])
-    for delay_ns, error in ((PAUSE_NS, ErrorClass.LENGTH), (3_000, ErrorClass.LENGTH)):
-        at = tb.clocks(REQUEST_NS + delay_ns)
+    for delay_ns, error in ((PAUSE_NS - one, ErrorClass.OK), (LENGTH_NS + one, ErrorClass.OK),
+                            (LENGTH_NS, ErrorClass.LENGTH), (3_000, ErrorClass.LENGTH)):
+        at = tb.clocks(REQUEST_NS) + round(delay_ns * tb.hz / 10**9)
         begin, records = await tb.hear(tb.request(0x155) + tb.answer(6, at))
         same(records, [Record(tb.time(begin), True, error, None)])
     # the end pulse late: the decision comes 6 us after it, and the pause ends later

@@ -5,7 +5,7 @@
 //   Answer or request: the first telegram between P_RX_OPEN and P_RX_TIMEOUT after a good request is its answer. Any
 //   other is a request when a pulse comes between 37.5 and 43.5 us, else an answer that stands alone.
 //   EARLY: a telegram that begins before P_RX_OPEN after a good request; recorded as an answer.
-//   Pause: P_PAUSE (7.5 us) after a good request or the good answer to it. After all else, and when it begins to
+//   Pause: P_PAUSE after a good request or the good answer to it. After all else, and when it begins to
 //   listen, BadPauseNs (18 us, longer than the hole that missing pulses of one bit leave), restarted by every pulse;
 //   such a hole ends the telegram in which it is, unless that is an answer, whose 43.5 us are always waited for.
 // Data and deviation are those of the 14-bit receiver, which has seen what the 7-bit one has; only the class differs.
@@ -13,7 +13,7 @@
 // comes has no record and is not counted as lost. The ring holds 255 records: head = tail is empty.
 // Against the Python library (asi.monitor, one record per call), on the same pulses:
 //   - a good request, then a pulse before 85.5 us from its start: here the request has LENGTH, there the call is EARLY;
-//     a later pulse that is still inside the 7.5 us of the pause has no record here;
+//     a later pulse that is still inside the pause has no record here;
 //   - a pulse between the decision on a good answer and the end of the pause: no record here, a request there;
 //   - a bad telegram without a good request before it is always a bad request there; here it is an answer if no
 //     pulse comes between 37.5 and 43.5 us, and its class may name a check of 7 bits instead of NO_INFORMATION;
