@@ -34,7 +34,9 @@ def run_cocotb(top, sources, test_module, *, name=None, parameters=None, extra_a
     name = name or "-".join([top, *(f"{k}{v}" for k, v in (parameters or {}).items())])
     build_dir = ROOT / "build/cocotb" / name
     waves = os.environ.get("WAVES") == "1"
-    args = ["--assert", "-Wall", "--timescale", "1ns/1ps", str(ROOT / "tools/lint.vlt"), *extra_args]
+    # one file per model: this Verilator's makefile cannot include its precompiled header when it splits a large one
+    args = ["--assert", "-Wall", "--output-split", "0", "--timescale", "1ns/1ps",
+            str(ROOT / "tools/lint.vlt"), *extra_args]
     if os.environ.get("ASI_COVERAGE") == "1":
         args.append("--coverage-line")
     os.environ.setdefault("OBJCACHE", f"bash {ROOT / 'tools/objcache.sh'} {ROOT / 'build/objcache'}")
