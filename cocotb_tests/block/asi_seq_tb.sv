@@ -40,15 +40,16 @@ module asi_seq_tb
   logic [31:0] mem_wdata, mem_rdata;
   logic [10:0] req_call;
   logic [1:0]  req_retries, attempt;
-  logic        req_no_reply, tick;
+  logic        req_no_reply, tick, unused_sel;  // req_sel_o: watched by asi_seq_rules_tb
   logic [2:0]  slot_phase;
   logic [3:0]  res_last, res_first;
 
   asi_seq #(.DexgRetry(DexgRetry), .FailCycles(FailCycles)) u_dut (
     .clk_i, .rst_i, .mem_req_o(mem_req), .mem_we_o(mem_we), .mem_addr_o(mem_addr), .mem_wdata_o(mem_wdata),
     .mem_rdata_i(mem_rdata), .req_valid_o(req_valid), .req_ready_i(req_ready), .req_call_o(req_call),
-    .req_retries_o(req_retries), .req_no_reply_o(req_no_reply), .res_valid_i(res_valid), .res_last_i(res_last),
-    .res_first_i(res_first), .res_data_i(rsp_data_i), .res_repeats_i(attempt), .sent_i(sent), .repeat_i(again),
+    .req_retries_o(req_retries), .req_no_reply_o(req_no_reply), .req_sel_o(unused_sel), .res_valid_i(res_valid),
+    .res_last_i(res_last), .res_first_i(res_first), .res_data_i(rsp_data_i), .res_repeats_i(attempt), .sent_i(sent),
+    .repeat_i(again),
     .enable_i, .cycle_en_i, .two_extra_i, .out_hold_i, .min_cycle_us_i, .tick_us_i(tick), .batch_start_i, .batch_len_i,
     .batch_busy_o, .cycle_busy_o, .batch_done_o(batch_done), .cycle_done_o(cycle_done), .slave_lost_o(slave_lost),
     .slot_phase_o(slot_phase), .sync_o(sync)

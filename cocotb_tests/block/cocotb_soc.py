@@ -11,6 +11,7 @@ from cocotb.utils import get_sim_time
 from cocotb_tests.block.hostport import Port
 
 RAM, DPM, REGS, LINK = 0x0000_8000, 0x4000_0000, 0x8000_0000, 0x8001_0000
+STATS, STATS_CLEAR, RING = 0x8002_0000, 0x8002_1000, 0x8003_0000
 MAIL = 0x3F00 // 4                                                 # mailbox of soc_probe.c, word in the host window
 OP, ADDR, DATA, RESULT, IRQS, EVENTS, ALIVE = range(MAIL, MAIL + 7)
 READ, WRITE, CALL, IRQ_ON, IRQ_OFF = {1: 1, 2: 2, 4: 3}, {1: 4, 2: 5, 4: 6}, 7, 8, 9
@@ -94,11 +95,11 @@ class TB:
 
 @cocotb.test(timeout_time=50, timeout_unit="ms")
 async def memory_map(dut):
-    """HW-006, HW-007: the core starts and reads and writes bytes, half-words, words in every memory of the map."""
+    """HW-006, HW-007, ST-004: the core starts; bytes, half-words, words in every memory of the map."""
     random.seed(3)
     tb = TB(dut)
     await tb.start()
-    for base, last in ((RAM, 0x7FFC), (DPM, 0x3EFC), (LINK, 0x3FC)):
+    for base, last in ((RAM, 0x7FFC), (DPM, 0x3EFC), (LINK, 0x3FC), (STATS, 0xFFC), (RING, 0x7FC)):
         for offset in (0, last):
             model = bytearray(4)
             await tb.poke(base + offset, 0)
@@ -109,6 +110,10 @@ async def memory_map(dut):
                 assert await tb.peek(base + offset) == int.from_bytes(model, "little"), hex(base + offset)
             for size, lane in ((2, 0), (2, 2), (1, 0), (1, 1), (1, 2), (1, 3)):
                 assert await tb.peek(base + offset + lane, size) == int.from_bytes(model[lane:lane + size], "little")
+    await tb.poke(STATS + 0x440, 0xFFFF_FFFF)
+    await tb.poke(STATS + 0x444, 0x5555_AAAA)
+    assert [await tb.peek(STATS_CLEAR + 0x440), await tb.peek(STATS + 0x440)] == [0xFFFF_FFFF, 0]  # ST-004
+    assert await tb.peek(STATS + 0x444) == 0x5555_AAAA
     await tb.poke(DPM + 4, 0x12345678)
     assert await tb.host_read(1) == 0x12345678
     await tb.host_write(0x3EF8 // 4, 0xCAFE_F00D)
@@ -130,8 +135,8 @@ async def access_to_nothing(dut):
         assert await tb.peek(addr) == 0, hex(addr)
     for addr, value in known.items():
         assert await tb.peek(addr) == value, hex(addr)
-    for offset in (0x30, 0x3C):                                    # inside the register block, but no register
-        assert await tb.peek(REGS + offset) == 0
+    for place in (STATS + 0x2000, RING + 0x800):                   # behind the statistics and the monitor ring
+        assert await tb.peek(place) == 0
 
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")

@@ -79,6 +79,8 @@ class LinePins:
         elif t_ns < self._target:
             self._pump_task.cancel()
             self._pump_task = cocotb.start_soon(self._pump())
+        else:
+            return          # the queue was run by _transmit meanwhile: the pump wakes early enough
         self._target = None
 
     def _show(self, pulse):

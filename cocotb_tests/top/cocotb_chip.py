@@ -219,6 +219,8 @@ async def activation_calls(dut):
     await chip.host.write("PP", 5, 3)
     assert await chip.host.commit() == 0
     await chip.host.until(lambda: _las_is(chip, {3}), 120_000, "activation")
+    while await chip.host.read("IN_SEQ") & 1:      # LAS stands before PECHO in a publication (HW-003)
+        pass
     records = chip.telegrams()
     assert records[0].t_ns >= SETTLE_NS - MS
     to_3 = [r.call for r in records if decode_call(r.call).name in ("WPAR", "DEXG") and r.call >> 5 & 31 == 3]

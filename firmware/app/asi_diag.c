@@ -14,9 +14,13 @@ static uint32_t head, dropped, last_us, stat_index;
 
 void asi_diag_init(void)
 {
-    for (unsigned w = (unsigned)(offsetof(asi_host_t, LINE_FAULTS) / 4u); w < sizeof(asi_host_t) / 4u; w++)
-        WIN(MAGIC)[w] = 0; /* MAGIC is word 0 of the window */
+    WIN(LINE_FAULTS)[0] = 0;
+    WIN(RING_HEAD)[0] = 0;
+    WIN(RING_TAIL)[0] = 0;
+    WIN(RING_LOST)[0] = 0;
     WIN(CLOCK_MHZ)[0] = hal_clock_mhz();
+    for (unsigned w = 0; w < HAL_STAT_WORDS * ASI_INDICES; w++)
+        WIN(STAT)[w] = 0;
 }
 
 void asi_diag_commit(bool monitor)
@@ -65,9 +69,6 @@ void asi_diag_serve(void)
         return;
     last_us = now;
     WIN(LINE_FAULTS)[0] = hal_line_faults();
-    uint32_t words[HAL_STAT_WORDS];
-    hal_stat(stat_index, words);
-    for (unsigned w = 0; w < HAL_STAT_WORDS; w++)
-        WIN(STAT)[HAL_STAT_WORDS * stat_index + w] = words[w];
+    hal_stat(stat_index, WIN(STAT) + HAL_STAT_WORDS * stat_index);
     stat_index = (stat_index + 1u) % ASI_INDICES;
 }

@@ -201,19 +201,19 @@ hal_counters_t hal_counters(void)
                             .failed = LINK(FAILED)[0]};
 }
 
-static void read_stat(uint32_t base, unsigned index, uint32_t words[HAL_STAT_WORDS])
+static void read_stat(uint32_t base, unsigned index, volatile uint32_t words[HAL_STAT_WORDS])
 {
     const volatile uint32_t *from = (const volatile uint32_t *)(base + 4u * HAL_STAT_WORDS * index);
     for (unsigned w = 0; w < HAL_STAT_WORDS; w++)
         words[w] = from[w];
 }
 
-void hal_stat(unsigned index, uint32_t words[HAL_STAT_WORDS])
+void hal_stat(unsigned index, volatile uint32_t words[HAL_STAT_WORDS])
 {
     read_stat(ASI_STATS_BASE, index, words);
 }
 
-void hal_stat_take(unsigned index, uint32_t words[HAL_STAT_WORDS])
+void hal_stat_take(unsigned index, volatile uint32_t words[HAL_STAT_WORDS])
 {
     read_stat(ASI_STATS_CLEAR_BASE, index, words);
 }

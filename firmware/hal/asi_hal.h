@@ -43,9 +43,9 @@ uint32_t hal_time_us(void);
 hal_counters_t hal_counters(void);
 enum { HAL_STAT_WORDS = 16 };
 /** Statistics of an index, words of stat_r in rdl/asi.rdl; each word is right, two of them may be an attempt apart. */
-void hal_stat(unsigned index, uint32_t words[HAL_STAT_WORDS]);
+void hal_stat(unsigned index, volatile uint32_t words[HAL_STAT_WORDS]);
 /** The same, and every word is 0 afterwards; no count is lost (ST-004). */
-void hal_stat_take(unsigned index, uint32_t words[HAL_STAT_WORDS]);
+void hal_stat_take(unsigned index, volatile uint32_t words[HAL_STAT_WORDS]);
 /** Line faults: bits 0..2 actual, 8..10 latched: APF, earth fault, jabber (LT-017). */
 uint32_t hal_line_faults(void);
 /** Forget the latched line faults; what is still there comes back at once. */

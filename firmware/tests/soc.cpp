@@ -3,6 +3,7 @@
 #include "soc.h"
 #include <cstring>
 #include <memory>
+#include <utility>
 #include "VVexRiscv.h"
 #include "asi_host.h"
 #include "asi_regs.h"
@@ -12,7 +13,7 @@ namespace {
 constexpr uint32_t kClocksPerUs = 16;
 std::unique_ptr<VerilatedContext> context;
 std::unique_ptr<VVexRiscv> cpu;
-uint32_t ram[16384], rom[256], window[4096], link_ram[256];
+uint32_t ram[16384], rom[256], window[4096], link_ram[256], stats[1024], ring[512];
 soc_state s;
 const uint8_t *flash;
 uint32_t flash_base, flash_bytes, flash_byte, flash_address, spi_data;
@@ -51,6 +52,9 @@ uint32_t reg_read(uint32_t offset) {
     case offsetof(asi_regs_t, WAIT): return s.event & s.event_en;
     case offsetof(asi_regs_t, SPI_DATA): return spi_data;
     case offsetof(asi_regs_t, SPI_CTRL): return s.spi_ctrl & 1;
+    case offsetof(asi_regs_t, LATCH): return s.latch;
+    case offsetof(asi_regs_t, MONITOR): return s.ring_head | s.ring_lost << 16;
+    case offsetof(asi_regs_t, CLOCK): return kClocksPerUs;
     default: s.bad_accesses++; return 0;
     }
 }
@@ -68,6 +72,11 @@ void reg_write(uint32_t offset, uint32_t data) {
     case offsetof(asi_regs_t, EVENT_EN): s.event_en = data; break;
     case offsetof(asi_regs_t, EXEC): s.exec = data; break;
     case offsetof(asi_regs_t, HOST_IRQ): s.host_irqs += data & 1; break;
+    case offsetof(asi_regs_t, LATCH): s.latch &= ~data; break;
+    case offsetof(asi_regs_t, MONITOR_CTRL):
+        s.monitor_ctrl = data;
+        if (data & 2) s.ring_head = s.ring_lost = 0;  // with tail 0: empty
+        break;
     case offsetof(asi_regs_t, SPI_DATA): flash_shift(data & 255); break;
     case offsetof(asi_regs_t, SPI_CTRL):
         if (data & ~s.spi_ctrl & 1) { s.flash_selects++; flash_byte = 0; flash_address = 0; }
@@ -77,12 +86,12 @@ void reg_write(uint32_t offset, uint32_t data) {
     }
 }
 
-/// published state, FLAGS to IN_IMG and CDI to the end without PCD and PP, may change only while IN_SEQ is odd
+/// published state, FLAGS to IN_IMG and CDI to PECHO without PCD and PP, may change only while IN_SEQ is odd
 void check_published(uint32_t offset) {
     const bool lists = offset >= offsetof(asi_host_t, FLAGS) && offset < offsetof(asi_host_t, IN_SEQ);
     const bool image = offset >= offsetof(asi_host_t, IN_IMG) && offset < offsetof(asi_host_t, OUT_IMG);
     const bool codes = (offset >= offsetof(asi_host_t, CDI) && offset < offsetof(asi_host_t, PCD)) ||
-                       (offset >= offsetof(asi_host_t, PI) && offset < sizeof(asi_host_t));
+                       (offset >= offsetof(asi_host_t, PI) && offset < offsetof(asi_host_t, LINE_FAULTS));
     const bool open = window[offsetof(asi_host_t, MAGIC) / 4] != 0;
     if (open && (lists || image || codes) && !(window[offsetof(asi_host_t, IN_SEQ) / 4] & 1)) s.seq_violations++;
 }
@@ -91,6 +100,9 @@ uint32_t bus_read(uint32_t a) {
     if (a < sizeof ram) return ram[a / 4];
     if (a >> 10 == 0x10000000u >> 10) return rom[(a & 0x3FF) / 4];
     if (a >> 14 == 0x40000000u >> 14) return window[(a & 0x3FFF) / 4];
+    if (a >> 12 == 0x80020000u >> 12) return stats[(a & 0xFFF) / 4];
+    if (a >> 12 == 0x80021000u >> 12) return std::exchange(stats[(a & 0xFFF) / 4], 0);
+    if (a >> 11 == 0x80030000u >> 11) return ring[(a & 0x7FF) / 4];
     if (a >> 10 == 0x80010000u >> 10) return link_ram[(a & 0x3FF) / 4];
     if (a >> 8 == 0x80000000u >> 8) return reg_read(a & 0xFF);
     s.bad_accesses++;
@@ -144,6 +156,8 @@ int soc_open(uint32_t reset_vector, const uint8_t *flash_data, uint32_t base, ui
     std::memset(ram, 0xA5, sizeof ram);
     std::memset(window, 0xA5, sizeof window);
     std::memset(link_ram, 0xA5, sizeof link_ram);
+    std::memset(stats, 0, sizeof stats);  // the chip clears it
+    std::memset(ring, 0xA5, sizeof ring);
     flash = flash_data, flash_base = base, flash_bytes = bytes, flash_byte = 0;
     asleep = false, woke = 0;
     cpu->externalResetVector = reset_vector;
@@ -157,6 +171,8 @@ uint32_t *soc_ram(void) { return ram; }
 uint32_t *soc_rom(void) { return rom; }
 uint32_t *soc_window(void) { return window; }
 uint32_t *soc_link(void) { return link_ram; }
+uint32_t *soc_stats() { return stats; }
+uint32_t *soc_ring() { return ring; }
 soc_state *soc_regs(void) { return &s; }
 
 int soc_run(uint32_t max_clocks) {

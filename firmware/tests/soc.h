@@ -22,6 +22,7 @@ typedef struct {
     uint64_t clocks;
     uint64_t skipped_us;      /* bus time that the test let pass while the core slept */
     uint32_t awake_max;       /* clocks between leaving and re-entering WAIT, worst case since the test set it to 0 */
+    uint32_t latch, monitor_ctrl, ring_head, ring_lost;
     uint32_t seq_violations;  /* published words changed while IN_SEQ was even */
 } soc_state;
 
@@ -29,6 +30,8 @@ int soc_open(uint32_t reset_vector, const uint8_t *flash, uint32_t flash_base, u
 uint32_t *soc_ram(void);      /* 16384 words at 0 */
 uint32_t *soc_rom(void);      /* 256 words at 0x1000_0000 */
 uint32_t *soc_window(void);   /* 4096 words at 0x4000_0000 */
+uint32_t *soc_stats(void);     /* 1024 words at 0x8002_0000 */
+uint32_t *soc_ring(void);      /* 512 words at 0x8003_0000 */
 uint32_t *soc_link(void);     /* 256 words at 0x8001_0000 */
 soc_state *soc_regs(void);
 /* Run until the core sleeps in WAIT without a pending event (-> 1), or for so many clocks (-> 0). */

@@ -89,7 +89,7 @@ def test_commit():
     assert chip.read("FLAGS") & 0b11101 == 0b00101  # Config_OK, Auto_Address_Assign
 
 
-@pytest.mark.parametrize("change", [{"LPS_CFG": 1}, {"PP": 16}, {"raw": 0x10}])
+@pytest.mark.parametrize("change", [{"LPS_CFG": 1}, {"PP": 16}, {"raw": 0x20}])
 def test_refused_commit(change):
     """HW-002, EX-025: a bad commit is acknowledged with its error and changes nothing; the next good one works."""
     chip = Chip(network()).start()
