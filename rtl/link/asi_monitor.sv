@@ -78,7 +78,7 @@ module asi_monitor
   logic [RingW-1:0]  head_d, head_q;
   logic [15:0]       lost_d, lost_q;
   logic              mark_d, mark_q;       // the next record is marked: some before it were lost
-  logic              pulse, paused, hole, listen, full, record, is_request, decided7;
+  logic              pulse, hole, listen, full, record, is_request, decided7;
   logic              done7, done14, late7, late;
   error_class_e      class7, class14, error;
   logic [3:0]        data7;
@@ -100,7 +100,6 @@ module asi_monitor
   // "will be over in the next clock, unless a pulse comes now": a pulse right at the end of a pause is after it
   assign pulse  = n_start_i || p_start_i;
   assign hole   = !pulse && hole_q;
-  assign paused = !pulse && (bad_d ? hole_q : pause_q);
   assign listen = state_q != StSync && !(hole && state_q != StIdle && !answer_q);
   // the end of an answer; what begins later than an answer may end says that this is a request
   assign decided7 = state_q == StTelegram && done7 && (!long_d || answer_q || early_q);
@@ -160,7 +159,7 @@ module asi_monitor
       error   = early_q ? ErrEarly : class14;
       state_d = StIdle;
     end
-    if (state_d == StSync && paused) state_d = StIdle;
+    if (state_d == StSync && !pulse && (bad_d ? hole_q : pause_q)) state_d = StIdle;
     if (!enable_i || clear_i) begin
       state_d = StSync;  bad_d = 1'b1;  asked_d = 1'b0;  record = 1'b0;
     end
