@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from asi import replay
 from asi.cli import app
 from asi.native import Chip
-from asi.regmap import ErrorClass
+from asi.regmap import HOST_RING_TAIL, ErrorClass
 from asi.telegram import encode_call, response_pulses
 from asi.window import HostWindow
 
@@ -201,6 +201,22 @@ def test_ring_overflow():
     assert [r.lost for r in window.monitored()] == [True, False]
 
 
+@pytest.mark.parametrize("tail", [0xFFFF_FFFF, 512, 0x8000_0003])
+def test_nonsense_in_ring_tail(tail):
+    """ST-008, ST-009: whatever another host program has left in RING_TAIL, the chip goes on, and who reads the ring
+    once has only new telegrams from then on."""
+    chip, window, _ = start()
+    window.set_control(monitor=True)
+    chip.run(chip.time_ns + 5 * MS)
+    chip.host_write(HOST_RING_TAIL, tail)
+    for value in (3, 9):
+        for t, polarity in conversation((encode_call("RDIO", 7), value), start=chip.time_ns + MS):
+            chip.net.inject(t, polarity)
+        chip.run(chip.time_ns + 5 * MS)
+        records = window.monitored()
+    assert [(r.request, r.data) for r in records] == [(True, encode_call("RDIO", 7)), (False, 9)]
+
+
 def test_line_faults():
     """LT-017, ST-009: a short power fail is seen as it is and stays latched until the next commit."""
     chip, window, _ = start(1)
@@ -214,3 +230,23 @@ def test_line_faults():
     window.set_control()
     chip.run(chip.time_ns + 5 * MS)
     assert window.line_faults() == {"apf": (False, False), "efault": (False, False), "jabber": (False, False)}
+
+
+def test_earth_fault():
+    """LT-016, LT-017, ST-009: after 1 s at the pin the host sees an earth fault; shorter ones leave no trace, and data
+    exchange goes on. Latched until the next commit, and again while it lasts."""
+    chip, window, _ = start(1)
+    chip.run(80 * MS)
+    chip.efault(True)
+    chip.run(chip.time_ns + 100 * MS)
+    chip.efault(False)                      # 100 ms: not long enough
+    chip.run(chip.time_ns + MS)
+    chip.efault(True)
+    begin = chip.time_ns
+    chip.run(begin + 995 * MS)
+    assert window.line_faults()["efault"] == (False, False) and window.state().las == {1}
+    chip.run(begin + 1_010 * MS)
+    assert window.line_faults()["efault"] == (True, True) and window.state().las == {1}
+    window.set_control()
+    chip.run(chip.time_ns + 5 * MS)
+    assert window.line_faults()["efault"] == (True, True)

@@ -246,6 +246,10 @@ class Chip:
         """Pin apf_ni: True = line voltage too low. The slaves follow net.power()."""
         self._lib.asi_chip_apf(self._chip, low)
 
+    def efault(self, fault):
+        """Pin efault_i: True = the front end sees an earth fault."""
+        self._lib.asi_chip_efault(self._chip, fault)
+
     def log(self):
         """-> [Telegram], drained."""
         return _drain(self._ffi, self._lib.asi_chip_log, self._chip)
