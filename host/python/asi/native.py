@@ -200,6 +200,12 @@ class Chip:
 
     def __init__(self, firmware=None, waves=None, seed=0):
         self._ffi, self._lib = load("asi_chip_trace" if waves else "asi_chip")
+        for what, name, mode in (("firmware", firmware, "rb"), ("waves", waves, "wb")):
+            try:
+                if name is not None:
+                    open(name, mode).close()
+            except OSError as error:
+                raise NativeError(f"{what} {name}: {error.strerror}") from None
         path = [self._ffi.NULL if p is None else self._ffi.new("char[]", str(Path(p).resolve()).encode())
                 for p in (firmware, waves)]
         chip = self._lib.asi_chip_new(*path, seed)
