@@ -327,6 +327,10 @@ void asi_chip_apf(asi_chip *chip, uint8_t low) {
     chip->top->apf_ni = !low;
     chip->inputs_changed = true;
 }
+void asi_chip_efault(asi_chip *chip, uint8_t fault) {
+    chip->top->efault_i = fault != 0;
+    chip->inputs_changed = true;
+}
 int asi_chip_log(asi_chip *chip, asi_telegram *out, int max) { return asi_net_log(&chip->net, out, max); }
 void asi_chip_get_stats(asi_chip *chip, asi_chip_stats *out) { chip->get_stats(*out); }
 

@@ -96,6 +96,7 @@ int64_t   asi_chip_run_irq(asi_chip *chip, int64_t until_ns);  /* as run, stops 
 uint32_t  asi_chip_host_read(asi_chip *chip, uint32_t byte_addr);                       /* a real bus cycle */
 void      asi_chip_host_write(asi_chip *chip, uint32_t byte_addr, uint32_t data, uint8_t byte_enable);
 void      asi_chip_apf(asi_chip *chip, uint8_t low);           /* pin apf_ni; the slaves follow asi_net_power */
+void      asi_chip_efault(asi_chip *chip, uint8_t fault);      /* pin efault_i */
 int       asi_chip_log(asi_chip *chip, asi_telegram *out, int max);                     /* as asi_net_log */
 void      asi_chip_get_stats(asi_chip *chip, asi_chip_stats *out);
 /* cffi end */

@@ -9,9 +9,10 @@ from test_decode import CALLS, TALK, TRAIN, conversation, csv_text, levels, man_
 from typer.testing import CliRunner
 
 from asi import replay
+from asi.capture import CaptureError
 from asi.cli import app
 from asi.native import Chip
-from asi.regmap import ErrorClass
+from asi.regmap import HOST_RING_TAIL, ErrorClass
 from asi.telegram import encode_call, response_pulses
 from asi.window import HostWindow
 
@@ -80,6 +81,29 @@ def test_silence_is_cut(tmp_path):
     assert abs(result.records[-1][0] - (train[-1][0] - 78_000)) <= 250
 
 
+def test_stuck_line(tmp_path):
+    """RP-001, RP-002: a comparator stuck for hours between two conversations costs no simulated time and spoils nothing;
+    times too large to be exact are refused in one line."""
+    hour = 3_600_000_000_000
+    rows = levels(TRAIN) + [(hour, 1, 0), (2 * hour, 0, 0)] + levels(conversation(*TALK, start=2 * hour + 100_000))[1:]
+    result = replay.replay(write(tmp_path, csv_text(rows), "stuck.csv"), FIRMWARE)
+    requests = [record.data for _, record in result.records if record.request and record.error_class == ErrorClass.OK]
+    assert requests == 2 * [call for call, _ in TALK] and not result.differences
+    assert abs(result.records[-1][0] - rows[-2][0] + 36_000) < 90_000
+    huge = "time_ns,rx_p,rx_n\n0,0,0\n1e30,1,0\n1e31,0,0\n1e300,0,1\n"
+    with pytest.raises(CaptureError, match="huge.csv: at 1e\\+30 ns: "):
+        replay.replay(write(tmp_path, huge, "huge.csv"), FIRMWARE)
+
+
+def test_babble_to_the_end(tmp_path):
+    """RP-001, DE-005: a babbling line that the end of the capture cuts off is no telegram for the decoder: no
+    difference, however long it was."""
+    train = TRAIN + [(TRAIN[-1][0] + 500_000 + 6_000 * k, 1) for k in range(1_000)]
+    result = replay.replay(write(tmp_path, csv_text(levels(train, end=train[-1][0] + 2_000)), "babble.csv"), FIRMWARE)
+    assert result.calls == len(TALK) and not result.differences
+    assert result.records[-1][1].error_class == ErrorClass.START
+
+
 def test_differences_are_told(tmp_path, monkeypatch):
     """RP-001: what the two sides see differently is named with both views, exit code 1."""
     path = write(tmp_path, csv_text(levels(TRAIN)), "x.csv")
@@ -107,7 +131,11 @@ def test_command(tmp_path):
     assert run(app, ["replay", str(path), *base]).exit_code == 1
     bad = run(app, ["replay", str(write(tmp_path, "nothing", "bad.csv")), *base])
     assert bad.exit_code == 2 and len(bad.stderr.splitlines()) == 1
-    assert run(app, ["replay", str(path), "--firmware", str(tmp_path / "none.hex")]).exit_code == 3
+    missing = run(app, ["replay", str(path), "--firmware", str(tmp_path / "none.hex")])
+    assert missing.exit_code == 3 and missing.stderr == f"simulation: firmware {tmp_path}/none.hex: No such file or directory\n"
+    for option in ("--out", "--waves"):     # told at once, not after the simulation
+        nowhere = run(app, ["replay", str(path), option, str(tmp_path / "none/x"), *base])
+        assert nowhere.exit_code == 2 and nowhere.stderr.splitlines() == [f"{tmp_path}/none/x: No such file or directory"]
     good = run(app, ["replay", str(write(tmp_path, csv_text(levels(TRAIN)), "x.csv")), "--out", str(records), *base])
     assert good.exit_code == 0 and len(records.read_text().splitlines()) == 2 * len(TALK) - 1
 
@@ -201,6 +229,22 @@ def test_ring_overflow():
     assert [r.lost for r in window.monitored()] == [True, False]
 
 
+@pytest.mark.parametrize("tail", [0xFFFF_FFFF, 512, 0x8000_0003])
+def test_nonsense_in_ring_tail(tail):
+    """ST-008, ST-009: whatever another host program has left in RING_TAIL, the chip goes on, and who reads the ring
+    once has only new telegrams from then on."""
+    chip, window, _ = start()
+    window.set_control(monitor=True)
+    chip.run(chip.time_ns + 5 * MS)
+    chip.host_write(HOST_RING_TAIL, tail)
+    for value in (3, 9):
+        for t, polarity in conversation((encode_call("RDIO", 7), value), start=chip.time_ns + MS):
+            chip.net.inject(t, polarity)
+        chip.run(chip.time_ns + 5 * MS)
+        records = window.monitored()
+    assert [(r.request, r.data) for r in records] == [(True, encode_call("RDIO", 7)), (False, 9)]
+
+
 def test_line_faults():
     """LT-017, ST-009: a short power fail is seen as it is and stays latched until the next commit."""
     chip, window, _ = start(1)
@@ -214,3 +258,23 @@ def test_line_faults():
     window.set_control()
     chip.run(chip.time_ns + 5 * MS)
     assert window.line_faults() == {"apf": (False, False), "efault": (False, False), "jabber": (False, False)}
+
+
+def test_earth_fault():
+    """LT-016, LT-017, ST-009: after 1 s at the pin the host sees an earth fault; shorter ones leave no trace, and data
+    exchange goes on. Latched until the next commit, and again while it lasts."""
+    chip, window, _ = start(1)
+    chip.run(80 * MS)
+    chip.efault(True)
+    chip.run(chip.time_ns + 100 * MS)
+    chip.efault(False)                      # 100 ms: not long enough
+    chip.run(chip.time_ns + MS)
+    chip.efault(True)
+    begin = chip.time_ns
+    chip.run(begin + 995 * MS)
+    assert window.line_faults()["efault"] == (False, False) and window.state().las == {1}
+    chip.run(begin + 1_010 * MS)
+    assert window.line_faults()["efault"] == (True, True) and window.state().las == {1}
+    window.set_control()
+    chip.run(chip.time_ns + 5 * MS)
+    assert window.line_faults()["efault"] == (True, True)

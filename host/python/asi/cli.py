@@ -241,6 +241,18 @@ def _output(path: Path | None) -> Iterator[TextIO]:
         yield file
 
 
+def _writable(*paths: Path | None) -> None:
+    """What cannot be written is told before minutes of work, not after them; ends the program."""
+    for path in filter(None, paths):
+        new = not path.exists()
+        try:
+            open(path, "ab").close()
+            if new:
+                path.unlink()
+        except OSError as error:
+            raise _fail(f"{path}: {error.strerror}", BAD_INPUT) from None
+
+
 def _numbers(text: str) -> frozenset[int]:
     try:
         return parse_numbers(text)
@@ -301,6 +313,7 @@ def decode(
     elif ab is not None:
         known = ab.__contains__
     options = _options(p, n, man, analog, invert, columns, time_unit, arm)
+    _writable(out, stats, html)
     info, code = Info(), OK
     trace, collected = (Trace(), Eye()) if html is not None else (None, None)
     with _output(out) as target:
@@ -354,8 +367,10 @@ def replay(
 ) -> None:
     """Feed a capture to the simulated chip, a passive monitor then, and compare what it saw with the decoder.
 
-    Exit codes: 0 they agree, 1 they differ or there is no telegram, 2 bad capture, 3 the simulation failed."""
+    Exit codes: 0 they agree, 1 they differ or there is no telegram, 2 bad capture or option, 3 the simulation
+    failed, 130 stopped by Ctrl-C."""
     options, info = _options(p, n, man, analog, invert, columns, time_unit, arm), Info()
+    _writable(out, waves)
     try:
         result = replaying.replay(file, firmware, options, waves, info)
     except CaptureError as error:

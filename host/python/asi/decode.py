@@ -310,7 +310,8 @@ def render(statistics: dict[str, Any]) -> "Group":
         ("cycle", "none seen" if not cycles["count"] else
          f"min {_us(cycles['min_ns'])} us, mean {_us(cycles['mean_ns'])} us, max {_us(cycles['max_ns'])} us; "
          f"{cycles['count']} cycles"),
-        ("request pulses", f"at most {_us(statistics['request_deviation_ns'])} us off the grid"),
+        ("request pulses", "none good" if statistics["request_deviation_ns"] is None else
+         f"at most {_us(statistics['request_deviation_ns'])} us off the grid"),
         *(("note", note) for note in statistics["notes"]),
     ]
     for name, value in rows:

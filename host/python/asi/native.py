@@ -200,6 +200,12 @@ class Chip:
 
     def __init__(self, firmware=None, waves=None, seed=0):
         self._ffi, self._lib = load("asi_chip_trace" if waves else "asi_chip")
+        for what, name, mode in (("firmware", firmware, "rb"), ("waves", waves, "wb")):
+            try:
+                if name is not None:
+                    open(name, mode).close()
+            except OSError as error:
+                raise NativeError(f"{what} {name}: {error.strerror}") from None
         path = [self._ffi.NULL if p is None else self._ffi.new("char[]", str(Path(p).resolve()).encode())
                 for p in (firmware, waves)]
         chip = self._lib.asi_chip_new(*path, seed)
@@ -245,6 +251,10 @@ class Chip:
     def apf(self, low):
         """Pin apf_ni: True = line voltage too low. The slaves follow net.power()."""
         self._lib.asi_chip_apf(self._chip, low)
+
+    def efault(self, fault):
+        """Pin efault_i: True = the front end sees an earth fault."""
+        self._lib.asi_chip_efault(self._chip, fault)
 
     def log(self):
         """-> [Telegram], drained."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from asi.capture import Info, Options, Sink, read
+from asi.capture import CaptureError, Info, Options, Sink, read
 from asi.monitor import BR01_CALL, PRGM_CALL, RX_TIMEOUT_NS, Monitor
 from asi.native import Chip
 from asi.regmap import ErrorClass
@@ -20,6 +20,7 @@ START_LIMIT_NS = 50_000_000     # firmware start and commit take some ms
 STEP_NS = 10_000_000            # 130 telegrams at most: far less than the ring holds
 SILENCE_NS = 1_000_000          # a longer silence of the capture is cut to this
 AHEAD_NS = 1_000_000            # pulses are put on the line at least this long before they are due
+LARGEST_NS = 2 ** 53            # a float is exact to the ns until here
 SAME_NS = 1_500                 # two views of one telegram begin within this: window of the filter and of the stamp
 REQUEST_NS, ANSWER_NS = 78_000, 36_000
 
@@ -73,8 +74,8 @@ def to_record(t_ns: float, record: RingRecord) -> dict[str, Any]:
 class _Feeder:
     """Pulses of the capture to the chip, silence cut; remembers how its time and the capture's belong together."""
 
-    def __init__(self, chip: Chip, window: HostWindow):
-        self.chip, self.window = chip, window
+    def __init__(self, chip: Chip, window: HostWindow, path: Path):
+        self.chip, self.window, self._path = chip, window, path
         self.records: list[tuple[float, RingRecord]] = []
         self._from: list[float] = []    # chip time from which on ...
         self._offset: list[float] = []  # ... this is to be added to get the capture's time
@@ -83,6 +84,7 @@ class _Feeder:
         self._done = chip.time_ns
 
     def pulse(self, t_ns: float, polarity: int, width_ns: float) -> None:
+        width_ns = min(width_ns, SILENCE_NS)    # a line that is stuck says no more than silence does
         if not self._from:
             self._jump(t_ns)
         elif t_ns - self._last > SILENCE_NS:
@@ -94,6 +96,8 @@ class _Feeder:
         self.chip.net.inject(max(at, self.chip.time_ns), polarity, max(1, round(width_ns)))
 
     def _jump(self, t_ns: float) -> None:
+        if abs(t_ns) > LARGEST_NS:
+            raise CaptureError(f"{self._path}: at {t_ns:.16g} ns: beyond 104 days, where times are no longer exact")
         now = self.chip.time_ns if not self._from else round(self._last - self._offset[-1])
         start = now + SILENCE_NS + AHEAD_NS
         self._from.append(start - SILENCE_NS / 2)
@@ -196,7 +200,7 @@ def replay(path: Path, firmware: Path, options: Options = Options(), waves: Path
     result, info = Result(), info or Info()
     with Chip(firmware, waves=waves) as chip:
         window = monitor_chip(chip)
-        feeder = _Feeder(chip, window)
+        feeder = _Feeder(chip, window, path)
         read(path, options, Sink(monitor.pulse, raw=feeder.pulse), info)
         feeder.finish()
         result.lost = window.monitor_lost()
@@ -205,6 +209,8 @@ def replay(path: Path, firmware: Path, options: Options = Options(), waves: Path
     chip_calls = list(calls_of_chip(result.records))
     # a telegram that the capture's end cuts off is one for the chip (the silence after it comes), none for the decoder
     last = info.end_ns - REQUEST_NS - RX_TIMEOUT_NS - ANSWER_NS
+    if monitor.open:    # may be longer: a line that babbles to the end
+        last = min(last, monitor.open[0].t_ns - SAME_NS)
     result.calls = len(calls)
     result.differences = [d for d in compare(calls, chip_calls) if d.decoder is not None or d.t_ns < last]
     return result

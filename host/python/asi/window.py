@@ -173,7 +173,7 @@ class HostWindow:
     def monitored(self) -> list[RingRecord]:
         """Take all telegrams that the passive monitor has recorded (ST-006); set_control(monitor=True) starts it."""
         read, ns = self.port.host_read, 1000 / self.clock_mhz()
-        head, tail, out = read(regmap.HOST_RING_HEAD), read(regmap.HOST_RING_TAIL), []
+        head, tail, out = read(regmap.HOST_RING_HEAD), read(regmap.HOST_RING_TAIL) % RING_RECORDS, []
         while tail != head:
             time, word = self._words(regmap.HOST_RING + 8 * tail, 2)
             late = 1 if _bits(word, "RECORD_LATE") else -1
