@@ -97,16 +97,16 @@ def synthesis_figures():
 
 # ---- minutes each: not run here, shown as they were left in build/ by the command that measures them
 def left(path, command, name, value):
-    """A figure made by value(json) from a file below build/; says so when it has not been measured in this checkout."""
+    """[a figure made by value(json) from a file below build/], nothing when it was not measured in this checkout."""
     path = BUILD / path
-    return (path.parent.name, name, value(json.loads(path.read_text())) if path.exists() else "not measured here", command)
+    return [(path.parent.name, name, value(json.loads(path.read_text())), command)] if path.exists() else []
 
 
 def proofs(tasks):
     passed = [t for t in tasks if t["result"] == "PASS"]
     targets = {t["target"] for t in tasks}
-    return (f"{len(targets)} targets, {len(passed)} of {len(tasks)} tasks hold, {sum(t['seconds'] for t in tasks):.0f} s in all, "
-            f"longest {max(t['seconds'] for t in tasks):.0f} s")
+    return (f"{len(targets)} targets, {len(passed)} of {len(tasks)} tasks hold, "
+            f"{sum(t['seconds'] for t in tasks):.0f} s in all, longest {max(t['seconds'] for t in tasks):.0f} s")
 
 
 def margins(found):
@@ -117,8 +117,9 @@ def margins(found):
 
 
 def long_figures():
-    return [left("formal/results.json", "make formal", "Proofs", proofs),
-            left("margins/margins.json", "make margins", "Legal installations, Monte Carlo with the analog line model", margins)]
+    return [*left("formal/results.json", "make formal", "Proofs", proofs),
+            *left("margins/margins.json", "make margins", "Monte Carlo of legal installations, analog line model",
+                  margins)]
 
 
 def versions():
