@@ -99,7 +99,8 @@ def synthesis_figures():
 def left(path, command, name, value):
     """[a figure made by value(json) from a file below build/], nothing when it was not measured in this checkout."""
     path = BUILD / path
-    return [(path.parent.name, name, value(json.loads(path.read_text())), command)] if path.exists() else []
+    key = path.parent.name if path.stem == "results" else path.stem
+    return [(key, name, value(json.loads(path.read_text())), command)] if path.exists() else []
 
 
 def proofs(tasks):
@@ -116,10 +117,27 @@ def margins(found):
             f"{sum(b['wrong'] for b in both)} accepted wrongly")
 
 
+def compliance(found):
+    def one(run):
+        rows = [row for group in run["groups"].values() for row in group]
+        bad = sum(row["failed"] is not None for row in rows)
+        return f"{run['dut']} {run['mhz']} MHz {len(rows)} cases, {bad} failed" + (", broken off" if run["error"] else "")
+    return "; ".join(one(run) for run in found["runs"])
+
+
+def mutants(found):
+    total, killed, same = len(found["mutants"]), found["killed"], found.get("equivalent", 0)
+    return f"{killed} of {total - same} killed; {same} more proved to be no fault at the pins"
+
+
 def long_figures():
     return [*left("formal/results.json", "make formal", "Proofs", proofs),
             *left("margins/margins.json", "make margins", "Monte Carlo of legal installations, analog line model",
-                  margins)]
+                  margins),
+            *left("compliance/compliance.json", "make compliance", "Line-level compliance: cases, RTL and netlist",
+                  compliance),
+            *left("compliance/mutants.json", "python -m cocotb_tests.compliance --mutants 200",
+                  "Mutants of the line layer killed", mutants)]
 
 
 def versions():

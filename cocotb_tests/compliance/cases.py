@@ -528,6 +528,22 @@ def read_back(m):
                                                                                           m.us(SYNC)))
     damaged("bad, early pulse: gap of an error", _without(m.word(word), 4), m.pins([(m.us(10), 1)]))
     damaged("bad, answer too late", _without(m.word(word), 4), m.answer(2, 70))
+    # what one check alone can see: nothing else is wrong with these
+    for call in (E1, ADRA7):
+        pulses = m.word(request_word(call))
+        for index in range(1, len(pulses) - 1):
+            time, before = pulses[index][0], pulses[index][0] - pulses[index - 1][0]
+            damaged(f"{call:03X}: pulses {index + 1} and {index + 2} missing", _without(pulses, index, index + 1),
+                    m.answer(index & 15), call)
+            if time // t.half % 2:
+                for by in (-1, 1):
+                    damaged(f"{call:03X}: boundary pulse {index + 1} missing, the next one moved by {by:+} clock",
+                            _without(_moved(pulses, index + 1, by), index), m.answer(index & 15), call)
+            if before == 2 * t.half and pulses[index + 1][0] - time == t.half:
+                early = m.us(-4.25)
+                damaged(f"{call:03X}: pulses {index + 1} and {index + 2} early, in the dead zones of one bit before",
+                        _moved(_moved(pulses, index, early), index + 1, early), m.answer(index & 15), call,
+                        width=t.filter)
 
 
 @group("C-OWW", "RX-003, RX-014")
