@@ -104,6 +104,19 @@ def test_babble_to_the_end(tmp_path):
     assert result.records[-1][1].error_class == ErrorClass.START
 
 
+def test_impossible_volts(tmp_path):
+    """DE-011, PL-009: two samples of a converter gone mad (1e308 V) cost the telegram they are in, nothing else, and
+    break neither replay nor page."""
+    rows = analog_csv(TRAIN).splitlines()
+    for k, bad in ((1_000, "1e308"), (1_001, "-1e308")):
+        rows[k] = rows[k].split(",")[0] + "," + bad
+    path = write(tmp_path, "\n".join(rows), "mad.csv")
+    result = replay.replay(path, FIRMWARE)
+    assert len(TALK) - 1 <= result.calls <= len(TALK) + 1 and not result.differences
+    page = CliRunner().invoke(app, ["decode", str(path), "--html", str(tmp_path / "mad.html")])
+    assert page.exit_code == 0 and (tmp_path / "mad.html").stat().st_size > 10_000
+
+
 def test_differences_are_told(tmp_path, monkeypatch):
     """RP-001: what the two sides see differently is named with both views, exit code 1."""
     path = write(tmp_path, csv_text(levels(TRAIN)), "x.csv")
@@ -278,3 +291,24 @@ def test_earth_fault():
     window.set_control()
     chip.run(chip.time_ns + 5 * MS)
     assert window.line_faults()["efault"] == (True, True)
+
+
+def test_foreign_sender_in_requests():
+    """RX-014, ST-001, SL-003: somebody else's pulses between the own ones spoil requests: BAD_MASTER, even where the
+    slave answers. Each attempt is counted once, and the slaves stay in data exchange."""
+    chip, window, _ = start(1, 2)
+    chip.run(80 * MS)
+    rng = random.Random(1)
+    for _ in range(60):
+        chip.run(chip.time_ns + rng.randrange(2_000_000, 3_000_000))    # a repetition shall find the line free
+        chip.net.inject(chip.time_ns + 1_000, rng.choice((-1, 1)))
+    chip.run(chip.time_ns + 5 * MS)
+    las = window.state().las
+    window.set_control(offline=True)
+    chip.run(chip.time_ns + 80 * MS)        # everything is copied once
+    log = chip.log()
+    counted = [window.statistics(index) for index in range(64) if index != 32]
+    spoilt = sum(found.classes.get(ErrorClass.BAD_MASTER, 0) for found in counted)
+    assert las == {1, 2}
+    assert sum(found.requests for found in counted) in (len(log), len(log) - 1)    # OFFLINE may abort the last one
+    assert 10 < spoilt <= 60 and sum(found.repeat_ok for found in counted) >= spoilt - 1

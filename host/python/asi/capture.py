@@ -22,6 +22,7 @@ from typing import Any, BinaryIO
 FILTER_NS = 750          # shorter pulses are ignored (RX-009)
 MAN_PULSE_NS = 1_500      # raw pulse made of an edge of MAN
 LOWEST_RATE_HZ = 2_000_000
+LARGEST_V = 1_000.0      # more is no voltage of a line, but would spoil the DC part for long
 ARM_V = 0.6              # the first pulse of a telegram must exceed this; the least legal one is 1.5 V
 TELEGRAM_GAP_NS = 13_500  # two bit times and P_WIN_LATE: a telegram that lost one pulse still has no longer gap
 BASE_NS = 1_000_000      # time constant of the DC removal
@@ -181,7 +182,7 @@ class Analog:
         self._active_ns = float("-inf")      # last time beyond the threshold
 
     def sample(self, t_ns: float, volts: float) -> None:
-        volts *= self._sign
+        volts = self._sign * min(LARGEST_V, max(-LARGEST_V, volts))
         if self._first is None:
             self._step(t_ns, volts)
             return
