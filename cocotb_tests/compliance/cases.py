@@ -483,7 +483,7 @@ def two_slaves(m):
 # --------------------------------------------------------------------------------------------- own request read back
 @group("C-OWN", "RX-014, RX-002, RX-004, RX-007")
 def read_back(m):
-    """Own request damaged: each pulse missing or turned, each bit another, a pulse more, no echo, late echo"""
+    """Own request: pulses missing or turned, each bit another, a pulse more, no echo, late echo; faults in pairs"""
     t = m.times
 
     def damaged(title, own, answer=(), call=E1, want=BAD_MASTER, width=None, **fields):
