@@ -42,8 +42,9 @@ setup: $(VENV)/.ready  ## virtual environment with the pinned packages
 
 # ---------------------------------------------------------------- generated files
 .PHONY: regs
-regs: $(VENV)/.ready  ## regenerate everything that comes from rdl/asi.rdl, and the HTML register reference
+regs: $(VENV)/.ready  ## regenerate everything that comes from rdl/, and the HTML register reference
 	@$(VPY) tools/gen_registers.py --html $(BUILD)/registers
+	@$(VPY) tools/gen_ctt.py
 
 # ---------------------------------------------------------------- lint, synthesis
 VEXRISCV := $(abspath $(VENV))/lib/$(PYDIR)/site-packages/pythondata_cpu_vexriscv/verilog/VexRiscv_Min.v

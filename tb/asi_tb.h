@@ -47,6 +47,23 @@ int      asi_net_set_present(asi_net *net, int slave, uint8_t present);        /
 int      asi_net_set_periphery_fault(asi_net *net, int slave, uint8_t fault);  /* status bit S1 */
 int      asi_net_set_faults(asi_net *net, int slave, const asi_slave_faults *faults);
 int      asi_net_get(const asi_net *net, int slave, asi_slave_state *state);
+/* options of one slave (SL-010); all 0 but write_ns = 15 ms by default */
+typedef struct {
+    int64_t write_ns;     /* time of a memory write after ADRA or WID1 */
+    uint8_t write_fails;  /* 1: the write ends with S3 = 1 and the old content */
+    uint8_t id1_locked;   /* 1: WID1 that changes the low three bits of ID1 is not answered */
+    uint8_t old;          /* 1: RID1 and RID2 are not answered */
+    uint8_t sel_at_zero;  /* 1: at address 0 an A/B slave obeys the select of its ID1 bit 3; 0: it obeys Sel = 0 */
+} asi_slave_options;
+int      asi_net_set_options(asi_net *net, int slave, const asi_slave_options *options);
+/* combined transactions (SL-009): the slave's kind follows from its codes, as in CT-001. Channels 0..3 */
+int      asi_net_set_value(asi_net *net, int slave, int channel, uint16_t value);     /* input word of the slave */
+int      asi_net_set_invalid(asi_net *net, int slave, uint8_t v0, uint8_t overflow);  /* bit per channel: sends V = 0, O = 1 */
+int      asi_net_get_value(const asi_net *net, int slave, int channel, uint16_t *value);  /* output word received; 0: none yet */
+int      asi_net_set_string(asi_net *net, int slave, int kind, const uint8_t *bytes, int n);  /* 0 ID, 1 diagnosis, 2 parameters;
+                                                                                     CTT2: 0 ID object, 1.. object of that index */
+int      asi_net_get_string(const asi_net *net, int slave, int kind, uint8_t *bytes, int max);
+int      asi_net_set_safety(asi_net *net, int slave, const uint8_t table[8], uint8_t closed);  /* closed: bits 0, 1 = channel 1, 2 */
 int      asi_net_power(asi_net *net, uint8_t good);                            /* 0: all slaves lose power */
 /* without a chip: a pulse of the master; then advance to t_ns and collect the slaves' pulses that start until then */
 int      asi_net_master_pulse(asi_net *net, int64_t t_ns, int32_t polarity);

@@ -11,6 +11,7 @@
 #include <stdint.h>
 #include "asi_config.h"
 #include "asi_lists.h"
+#include "asi_permanent.h"
 #include "asi_port.h"
 #include "asi_status.h"
 
@@ -31,13 +32,6 @@ enum {
     ASI_FLAG_OFFLINE_READY = 1u << 7,
     ASI_FLAG_PERIPHERY_OK = 1u << 8,
 };
-
-/** What the host has projected; memory of the caller, unchanged until it is replaced by another one. */
-typedef struct {
-    asi_list_t lps;               /**< projected slaves; never 0 or 32 */
-    uint16_t pcd[ASI_INDICES];    /**< projected codes */
-    uint8_t pp[ASI_INDICES];      /**< projected parameters, 0..F */
-} asi_projection_t;
 
 /** What the master knows and shows; read only outside asi_ec.c. Consistent between two calls of this interface. */
 typedef struct {

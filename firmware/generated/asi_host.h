@@ -80,6 +80,45 @@ extern "C" {
 #define PARAM_R__VALUE_bp 0
 #define PARAM_R__VALUE_bw 4
 
+// reg - store_r
+#define STORE_R__STATE_bm 0xf
+#define STORE_R__STATE_bp 0
+#define STORE_R__STATE_bw 4
+#define STORE_R__BUSY_bm 0x10
+#define STORE_R__BUSY_bp 4
+#define STORE_R__BUSY_bw 1
+#define STORE_R__FAILED_bm 0x20
+#define STORE_R__FAILED_bp 5
+#define STORE_R__FAILED_bw 1
+#define STORE_R__SAVED_bm 0x40
+#define STORE_R__SAVED_bp 6
+#define STORE_R__SAVED_bw 1
+#define STORE_R__SEQUENCE_bm 0xffff0000
+#define STORE_R__SEQUENCE_bp 16
+#define STORE_R__SEQUENCE_bw 16
+
+// reg - log_r::TIME
+#define LOG_R__TIME__VALUE_bm 0xffffffff
+#define LOG_R__TIME__VALUE_bp 0
+#define LOG_R__TIME__VALUE_bw 32
+
+// reg - log_r::EVENT
+#define LOG_R__EVENT__EVENT_bm 0xff
+#define LOG_R__EVENT__EVENT_bp 0
+#define LOG_R__EVENT__EVENT_bw 8
+#define LOG_R__EVENT__INDEX_bm 0xff00
+#define LOG_R__EVENT__INDEX_bp 8
+#define LOG_R__EVENT__INDEX_bw 8
+#define LOG_R__EVENT__DATA_bm 0xffff0000
+#define LOG_R__EVENT__DATA_bp 16
+#define LOG_R__EVENT__DATA_bw 16
+
+// regfile - log_r
+typedef struct __attribute__ ((__packed__)) {
+    uint32_t TIME;
+    uint32_t EVENT;
+} log_r_t;
+
 // reg - stat_r::COUNT
 #define STAT_R__COUNT__VALUE_bm 0xffffffff
 #define STAT_R__COUNT__VALUE_bp 0
@@ -195,7 +234,31 @@ typedef struct __attribute__ ((__packed__)) {
     uint32_t RING_TAIL;
     uint32_t RING_LOST;
     uint32_t CLOCK_MHZ;
-    uint8_t RESERVED_2d4_fff[0xd2c];
+    uint32_t STORE;
+    uint8_t RESERVED_2d8_2df[0x8];
+    uint32_t SAFE_IN[4];
+    uint8_t RESERVED_2f0_2ff[0x10];
+    uint32_t FN_SEQ;
+    uint32_t FN_CODE;
+    uint32_t FN_ARG[2];
+    uint32_t FN_LEN;
+    uint32_t FN_DONE;
+    uint32_t FN_STATUS;
+    uint32_t FN_DATA;
+    uint32_t FN_STRING[56];
+    uint32_t CTT_STATE[16];
+    uint8_t RESERVED_440_4ff[0xc0];
+    uint32_t AIDI[64];
+    uint32_t AODI[64];
+    uint32_t CHANGED_SLAVES[2];
+    uint32_t CHANGED_TIME;
+    uint32_t OFFLINE_CAUSES;
+    uint32_t OFFLINE_TIME;
+    uint32_t SUSPECTS[2];
+    uint32_t LOG_HEAD;
+    uint8_t RESERVED_720_7ff[0xe0];
+    log_r_t LOG[64];
+    uint8_t RESERVED_a00_fff[0x600];
     stat_r_t STAT[64];
     telegram_r_t RING[512];
 } asi_host_t;

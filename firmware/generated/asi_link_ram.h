@@ -17,6 +17,9 @@ extern "C" {
 #define SLOT_R__EXTENDED_bm 0x2
 #define SLOT_R__EXTENDED_bp 1
 #define SLOT_R__EXTENDED_bw 1
+#define SLOT_R__LIVE_bm 0x4
+#define SLOT_R__LIVE_bp 2
+#define SLOT_R__LIVE_bw 1
 
 // reg - slot_state_r
 #define SLOT_STATE_R__DATA_bm 0xf
@@ -34,6 +37,12 @@ extern "C" {
 #define SLOT_STATE_R__STREAK_bm 0x70000
 #define SLOT_STATE_R__STREAK_bp 16
 #define SLOT_STATE_R__STREAK_bw 3
+#define SLOT_STATE_R__SENT_bm 0xf00000
+#define SLOT_STATE_R__SENT_bp 20
+#define SLOT_STATE_R__SENT_bw 4
+#define SLOT_STATE_R__CALLS_bm 0xf0000000
+#define SLOT_STATE_R__CALLS_bp 28
+#define SLOT_STATE_R__CALLS_bw 4
 
 // reg - request_r
 #define REQUEST_R__CALL_bm 0x7ff

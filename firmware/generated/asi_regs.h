@@ -37,6 +37,10 @@ extern "C" {
 #define ASI_REGS__CTRL__LINE_EN_bp 3
 #define ASI_REGS__CTRL__LINE_EN_bw 1
 #define ASI_REGS__CTRL__LINE_EN_reset 0x0
+#define ASI_REGS__CTRL__READ_ID_bm 0x10
+#define ASI_REGS__CTRL__READ_ID_bp 4
+#define ASI_REGS__CTRL__READ_ID_bw 1
+#define ASI_REGS__CTRL__READ_ID_reset 0x0
 #define ASI_REGS__CTRL__MIN_CYCLE_US_bm 0x1fff0000
 #define ASI_REGS__CTRL__MIN_CYCLE_US_bp 16
 #define ASI_REGS__CTRL__MIN_CYCLE_US_bw 13
@@ -91,11 +95,15 @@ extern "C" {
 #define ASI_REGS__EVENT__EFAULT_CHANGE_bp 6
 #define ASI_REGS__EVENT__EFAULT_CHANGE_bw 1
 #define ASI_REGS__EVENT__EFAULT_CHANGE_reset 0x0
+#define ASI_REGS__EVENT__EXCHANGE_DONE_bm 0x80
+#define ASI_REGS__EVENT__EXCHANGE_DONE_bp 7
+#define ASI_REGS__EVENT__EXCHANGE_DONE_bw 1
+#define ASI_REGS__EVENT__EXCHANGE_DONE_reset 0x0
 
 // reg - asi_regs::EVENT_EN
-#define ASI_REGS__EVENT_EN__MASK_bm 0x7f
+#define ASI_REGS__EVENT_EN__MASK_bm 0xff
 #define ASI_REGS__EVENT_EN__MASK_bp 0
-#define ASI_REGS__EVENT_EN__MASK_bw 7
+#define ASI_REGS__EVENT_EN__MASK_bw 8
 #define ASI_REGS__EVENT_EN__MASK_reset 0x0
 
 // reg - asi_regs::TIME
@@ -116,9 +124,9 @@ extern "C" {
 #define ASI_REGS__HOST_IRQ__SET_reset 0x0
 
 // reg - asi_regs::WAIT
-#define ASI_REGS__WAIT__PENDING_bm 0x7f
+#define ASI_REGS__WAIT__PENDING_bm 0xff
 #define ASI_REGS__WAIT__PENDING_bp 0
-#define ASI_REGS__WAIT__PENDING_bw 7
+#define ASI_REGS__WAIT__PENDING_bw 8
 
 // reg - asi_regs::SPI_DATA
 #define ASI_REGS__SPI_DATA__DATA_bm 0xff

@@ -20,6 +20,7 @@ def run(*command):
 def test_registers_are_generated():
     """HW-006: the register files in the tree are what rdl/asi.rdl makes (make regs)."""
     run(sys.executable, "tools/gen_registers.py", "--check")
+    run(sys.executable, "tools/gen_ctt.py", "--check")
 
 
 def test_matrix_is_generated():

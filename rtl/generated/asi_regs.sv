@@ -144,6 +144,10 @@ module asi_regs (
                 logic load_next;
             } line_en;
             struct {
+                logic next;
+                logic load_next;
+            } read_id;
+            struct {
                 logic [12:0] next;
                 logic load_next;
             } min_cycle_us;
@@ -183,10 +187,14 @@ module asi_regs (
                 logic next;
                 logic load_next;
             } efault_change;
+            struct {
+                logic next;
+                logic load_next;
+            } exchange_done;
         } EVENT;
         struct {
             struct {
-                logic [6:0] next;
+                logic [7:0] next;
                 logic load_next;
             } mask;
         } EVENT_EN;
@@ -260,6 +268,9 @@ module asi_regs (
                 logic value;
             } line_en;
             struct {
+                logic value;
+            } read_id;
+            struct {
                 logic [12:0] value;
             } min_cycle_us;
         } CTRL;
@@ -290,10 +301,13 @@ module asi_regs (
             struct {
                 logic value;
             } efault_change;
+            struct {
+                logic value;
+            } exchange_done;
         } EVENT;
         struct {
             struct {
-                logic [6:0] value;
+                logic [7:0] value;
             } mask;
         } EVENT_EN;
         struct {
@@ -433,6 +447,29 @@ module asi_regs (
         end
     end
     assign hwif_out.CTRL.line_en.value = field_storage.CTRL.line_en.value;
+    // Field: asi_regs.CTRL.read_id
+    always_comb begin
+        automatic logic [0:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.CTRL.read_id.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.CTRL && decoded_req_is_wr) begin // SW write
+            next_c = (field_storage.CTRL.read_id.value & ~decoded_wr_biten[4:4]) | (decoded_wr_data[4:4] & decoded_wr_biten[4:4]);
+            load_next_c = '1;
+        end
+        field_combo.CTRL.read_id.next = next_c;
+        field_combo.CTRL.read_id.load_next = load_next_c;
+    end
+    always_ff @(posedge clk) begin
+        if(rst) begin
+            field_storage.CTRL.read_id.value <= 1'h0;
+        end else begin
+            if(field_combo.CTRL.read_id.load_next) begin
+                field_storage.CTRL.read_id.value <= field_combo.CTRL.read_id.next;
+            end
+        end
+    end
+    assign hwif_out.CTRL.read_id.value = field_storage.CTRL.read_id.value;
     // Field: asi_regs.CTRL.min_cycle_us
     always_comb begin
         automatic logic [12:0] next_c;
@@ -662,14 +699,40 @@ module asi_regs (
         end
     end
     assign hwif_out.EVENT.efault_change.value = field_storage.EVENT.efault_change.value;
+    // Field: asi_regs.EVENT.exchange_done
+    always_comb begin
+        automatic logic [0:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.EVENT.exchange_done.value;
+        load_next_c = '0;
+        if(hwif_in.EVENT.exchange_done.hwset) begin // HW Set
+            next_c = '1;
+            load_next_c = '1;
+        end else if(decoded_reg_strb.EVENT && decoded_req_is_wr) begin // SW write 1 clear
+            next_c = field_storage.EVENT.exchange_done.value & ~(decoded_wr_data[7:7] & decoded_wr_biten[7:7]);
+            load_next_c = '1;
+        end
+        field_combo.EVENT.exchange_done.next = next_c;
+        field_combo.EVENT.exchange_done.load_next = load_next_c;
+    end
+    always_ff @(posedge clk) begin
+        if(rst) begin
+            field_storage.EVENT.exchange_done.value <= 1'h0;
+        end else begin
+            if(field_combo.EVENT.exchange_done.load_next) begin
+                field_storage.EVENT.exchange_done.value <= field_combo.EVENT.exchange_done.next;
+            end
+        end
+    end
+    assign hwif_out.EVENT.exchange_done.value = field_storage.EVENT.exchange_done.value;
     // Field: asi_regs.EVENT_EN.mask
     always_comb begin
-        automatic logic [6:0] next_c;
+        automatic logic [7:0] next_c;
         automatic logic load_next_c;
         next_c = field_storage.EVENT_EN.mask.value;
         load_next_c = '0;
         if(decoded_reg_strb.EVENT_EN && decoded_req_is_wr) begin // SW write
-            next_c = (field_storage.EVENT_EN.mask.value & ~decoded_wr_biten[6:0]) | (decoded_wr_data[6:0] & decoded_wr_biten[6:0]);
+            next_c = (field_storage.EVENT_EN.mask.value & ~decoded_wr_biten[7:0]) | (decoded_wr_data[7:0] & decoded_wr_biten[7:0]);
             load_next_c = '1;
         end
         field_combo.EVENT_EN.mask.next = next_c;
@@ -677,7 +740,7 @@ module asi_regs (
     end
     always_ff @(posedge clk) begin
         if(rst) begin
-            field_storage.EVENT_EN.mask.value <= 7'h0;
+            field_storage.EVENT_EN.mask.value <= 8'h0;
         end else begin
             if(field_combo.EVENT_EN.mask.load_next) begin
                 field_storage.EVENT_EN.mask.value <= field_combo.EVENT_EN.mask.next;
@@ -964,6 +1027,7 @@ module asi_regs (
             readback_data_var[1] = field_storage.CTRL.two_extra.value;
             readback_data_var[2] = field_storage.CTRL.out_hold.value;
             readback_data_var[3] = field_storage.CTRL.line_en.value;
+            readback_data_var[4] = field_storage.CTRL.read_id.value;
             readback_data_var[28:16] = field_storage.CTRL.min_cycle_us.value;
         end
         if(rd_mux_addr == 6'h8) begin
@@ -983,9 +1047,10 @@ module asi_regs (
             readback_data_var[4] = field_storage.EVENT.tick.value;
             readback_data_var[5] = field_storage.EVENT.host_attn.value;
             readback_data_var[6] = field_storage.EVENT.efault_change.value;
+            readback_data_var[7] = field_storage.EVENT.exchange_done.value;
         end
         if(rd_mux_addr == 6'h14) begin
-            readback_data_var[6:0] = field_storage.EVENT_EN.mask.value;
+            readback_data_var[7:0] = field_storage.EVENT_EN.mask.value;
         end
         if(rd_mux_addr == 6'h18) begin
             readback_data_var[31:0] = hwif_in.TIME.us.next;
@@ -997,7 +1062,7 @@ module asi_regs (
             readback_data_var[0] = field_storage.HOST_IRQ.set.value;
         end
         if(rd_mux_addr == 6'h24) begin
-            readback_data_var[6:0] = hwif_in.WAIT.pending.next;
+            readback_data_var[7:0] = hwif_in.WAIT.pending.next;
         end
         if(rd_mux_addr == 6'h28) begin
             readback_data_var[7:0] = field_storage.SPI_DATA.data.value;

@@ -59,6 +59,10 @@ package asi_regs_pkg;
     } asi_regs__EVENT__efault_change__in_t;
 
     typedef struct {
+        logic hwset;
+    } asi_regs__EVENT__exchange_done__in_t;
+
+    typedef struct {
         asi_regs__EVENT__cycle_done__in_t cycle_done;
         asi_regs__EVENT__batch_done__in_t batch_done;
         asi_regs__EVENT__slave_lost__in_t slave_lost;
@@ -66,6 +70,7 @@ package asi_regs_pkg;
         asi_regs__EVENT__tick__in_t tick;
         asi_regs__EVENT__host_attn__in_t host_attn;
         asi_regs__EVENT__efault_change__in_t efault_change;
+        asi_regs__EVENT__exchange_done__in_t exchange_done;
     } asi_regs__EVENT__in_t;
 
     typedef struct {
@@ -77,7 +82,7 @@ package asi_regs_pkg;
     } asi_regs__TIME__in_t;
 
     typedef struct {
-        logic [6:0] next;
+        logic [7:0] next;
     } asi_regs__WAIT__pending__in_t;
 
     typedef struct {
@@ -169,6 +174,10 @@ package asi_regs_pkg;
     } asi_regs__CTRL__line_en__out_t;
 
     typedef struct {
+        logic value;
+    } asi_regs__CTRL__read_id__out_t;
+
+    typedef struct {
         logic [12:0] value;
     } asi_regs__CTRL__min_cycle_us__out_t;
 
@@ -177,6 +186,7 @@ package asi_regs_pkg;
         asi_regs__CTRL__two_extra__out_t two_extra;
         asi_regs__CTRL__out_hold__out_t out_hold;
         asi_regs__CTRL__line_en__out_t line_en;
+        asi_regs__CTRL__read_id__out_t read_id;
         asi_regs__CTRL__min_cycle_us__out_t min_cycle_us;
     } asi_regs__CTRL__out_t;
 
@@ -218,6 +228,10 @@ package asi_regs_pkg;
     } asi_regs__EVENT__efault_change__out_t;
 
     typedef struct {
+        logic value;
+    } asi_regs__EVENT__exchange_done__out_t;
+
+    typedef struct {
         asi_regs__EVENT__cycle_done__out_t cycle_done;
         asi_regs__EVENT__batch_done__out_t batch_done;
         asi_regs__EVENT__slave_lost__out_t slave_lost;
@@ -225,10 +239,11 @@ package asi_regs_pkg;
         asi_regs__EVENT__tick__out_t tick;
         asi_regs__EVENT__host_attn__out_t host_attn;
         asi_regs__EVENT__efault_change__out_t efault_change;
+        asi_regs__EVENT__exchange_done__out_t exchange_done;
     } asi_regs__EVENT__out_t;
 
     typedef struct {
-        logic [6:0] value;
+        logic [7:0] value;
     } asi_regs__EVENT_EN__mask__out_t;
 
     typedef struct {

@@ -145,7 +145,7 @@ module asi_soc #(
   end
 
   // ---------------------------------------------------------------- registers
-  logic [6:0]  pending;
+  logic [7:0]  pending;
   logic        regs_go, is_wait, spi_shift, spi_busy, rd_ack, wr_ack, rd_err, wr_err, stall_rd, stall_wr;
   logic [7:0]  spi_next;
 
@@ -156,8 +156,8 @@ module asi_soc #(
   assign irq         = pending != '0;
   // registered: what the core reads in WAIT does not hang on its own request in the same clock
   always_ff @(posedge clk_i)
-    pending <= {7{~rst_i}} & hw_out.EVENT_EN.mask.value &
-                       {hw_out.EVENT.efault_change.value, hw_out.EVENT.host_attn.value, hw_out.EVENT.tick.value, hw_out.EVENT.apf_change.value,
+    pending <= {8{~rst_i}} & hw_out.EVENT_EN.mask.value &
+                       {hw_out.EVENT.exchange_done.value, hw_out.EVENT.efault_change.value, hw_out.EVENT.host_attn.value, hw_out.EVENT.tick.value, hw_out.EVENT.apf_change.value,
                         hw_out.EVENT.slave_lost.value, hw_out.EVENT.batch_done.value, hw_out.EVENT.cycle_done.value};
 
   always_comb begin
@@ -172,6 +172,7 @@ module asi_soc #(
     hw_in.EVENT.tick.hwset          = tick_us_o & (&time_q[9:0]);
     hw_in.EVENT.host_attn.hwset     = host_attn;
     hw_in.EVENT.efault_change.hwset = efault_i ^ efault_q;
+    hw_in.EVENT.exchange_done.hwset = 1'b0;
     hw_in.LATCH.apf.hwset           = apf_i;
     hw_in.LATCH.efault.hwset        = efault_i;
     hw_in.LATCH.jabber.hwset        = jabber_i;

@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/**
+ * @file asi_ctt.h  Combined transactions: values, bytes and strings over many DEXG calls (CT-001 ..).
+ * Layer: protocol core. It sees nibbles at line level and the time; it knows neither execution control nor port.
+ * Memory: one asi_ctt_t, owned by the caller. Context: not reentrant, in the interrupt or with it masked.
+ * All choices of the bit layer: rdl/ctt.toml. Engines: asi_ctt1.c, asi_ctt2.c, asi_ctt3.c, asi_ctt4.c, asi_ctt5.c.
+ */
+#ifndef ASI_CTT_H
+#define ASI_CTT_H
+#include <stdbool.h>
+#include <stdint.h>
+#include "asi_config.h"
+#include "asi_ctt_table.h"
+#include "asi_lists.h"
+#include "asi_status.h"
+
+/** What kind of transaction a slave's codes ask for (CT-001). */
+typedef enum {
+    ASI_CTT_NONE,    /**< plain nibbles */
+    ASI_CTT_1_IN, ASI_CTT_1_OUT,  /**< S-7.1 .. 7.4 */
+    ASI_CTT_2,       /**< S-7.5.5, S-7.A.5, S-B.A.5 */
+    ASI_CTT_3_4IO,   /**< S-7.A.7 */
+    ASI_CTT_3_8IO,   /**< S-7.A.A */
+    ASI_CTT_4,       /**< S-7.A.8, S-7.A.9 */
+    ASI_CTT_5,       /**< S-6.0: member of a group of addresses */
+    ASI_CTT_SAFETY,  /**< S-x.B: transported only */
+} asi_ctt_kind_t;
+
+/** Words of AIDI and AODI: 4 of a number; standard slaves have all, A slaves the first two, B slaves the last two. */
+#define ASI_ANALOG_WORDS 128u
+static inline unsigned asi_analog_word(unsigned index) { return (index & 31u) * 4u + (index >> 5) * 2u; }
+
+/** Bits of asi_ctt_t.status. */
+enum {
+    ASI_CTT_VALID = 15u,          /**< one bit per channel: the value is the slave's, not a substitute */
+    ASI_CTT_OV = 1u << 4,         /**< outputs: the slave takes new values */
+    ASI_CTT_TV = 1u << 5,         /**< the transfer works: no time-out, no toggle error */
+    ASI_CTT_TRANSPARENT = 1u << 6, /**< 16 plain bits, not an analog value */
+    ASI_CTT_STRING = 1u << 7,     /**< a string or message is open; cyclic values of this slave pause */
+};
+
+/** One finished DEXG call to a slave. */
+typedef struct {
+    bool ok;           /**< answered */
+    uint8_t sent;      /**< I3..I0 on the line; of an A/B slave I3 is ~Sel */
+    uint8_t answer;    /**< I3..I0 */
+    uint8_t outputs;   /**< host nibble of this index, host level */
+    uint32_t now_us;   /**< bus time */
+} asi_ctt_call_t;
+
+/** Strings and messages: one at a time on a line. */
+typedef enum {
+    ASI_STRING_ID, ASI_STRING_DIAGNOSIS, ASI_STRING_READ, ASI_STRING_WRITE,  /**< S-7.4 */
+    ASI_STRING_MESSAGE,  /**< CTT2: request in, response out */
+} asi_string_kind_t;
+
+typedef struct {
+    bool open;
+    uint8_t index, kind;
+    asi_status_t status;     /**< of the last one; ASI_E_BUSY while open */
+    uint16_t length, position;
+    uint8_t bytes[ASI_CTT2_MESSAGE_BYTES];
+} asi_string_t;
+
+enum { ASI_CTT_SLAVE_WORDS = 12 };  /* private state of an engine per slave */
+
+typedef struct {
+    /* what the host sees */
+    uint16_t ai[ASI_ANALOG_WORDS];   /**< AIDI; a substitute value wherever status says not valid */
+    uint8_t status[ASI_INDICES];
+    asi_list_t safe_in[2];           /**< non-safe view: F-IN1, F-IN2 */
+    asi_list_t changed;              /**< indices whose ai or status changed; cleared by the reader */
+    /* what the host gives */
+    uint16_t ao[ASI_ANALOG_WORDS];   /**< AODI */
+    asi_string_t string;
+    /* private */
+    uint8_t kind[ASI_INDICES];
+    asi_list_t open, live;
+    uint32_t slave[ASI_INDICES][ASI_CTT_SLAVE_WORDS];
+} asi_ctt_t;
+
+/** Kind for these codes (IO 3..0, ID 7..4, ID1 11..8, ID2 15..12). */
+asi_ctt_kind_t asi_ctt_kind(uint16_t codes);
+/** Nothing open; all values are substitutes of nothing: 0. */
+void asi_ctt_init(asi_ctt_t *c);
+/** The slave entered LAS. @return true when its slot must be live: asi_ctt_call then gives each next nibble */
+bool asi_ctt_open(asi_ctt_t *c, unsigned index, uint16_t codes, uint32_t now_us);
+/** The slave left LAS: substitute values, an open string ends with ASI_E_ABORTED. */
+void asi_ctt_close(asi_ctt_t *c, unsigned index);
+/** First nibble of a live slave after asi_ctt_open, line level. */
+unsigned asi_ctt_first(asi_ctt_t *c, unsigned index, unsigned outputs);
+/** One call of a live slave is over. @return the nibble of its next call, line level (I3 of an A/B slave is not used) */
+unsigned asi_ctt_call(asi_ctt_t *c, unsigned index, const asi_ctt_call_t *call);
+/** Digital inputs of a live slave for IDI, from its last answer, host level. */
+unsigned asi_ctt_inputs(const asi_ctt_t *c, unsigned index, unsigned answer);
+/** End of a cycle for the kinds that are not live: groups of CTT5 and safety slaves. failed: indices called in this cycle
+ * without an answer. in: input image, corrected in place (a failed safety slave is 0). out: host image; CTT5 members get
+ * their nibbles of AODI in it. codes: CDI. */
+void asi_ctt_cycle(asi_ctt_t *c, const asi_list_t *las, const asi_list_t *called, const asi_list_t *failed,
+                   const uint16_t codes[ASI_INDICES], uint32_t in[ASI_IMAGE_WORDS], uint32_t out[ASI_IMAGE_WORDS]);
+/** Members of incomplete CTT5 groups in LAS: a configuration error (CT-052). */
+asi_list_t asi_ctt_incomplete(const asi_ctt_t *c, const asi_list_t *las, const uint16_t codes[ASI_INDICES]);
+/** Begin a string or message of c->string.bytes (length: bytes to write). The caller has set the slave's parameter.
+ * @return ASI_E_NOT_ACTIVE, ASI_E_PROFILE, ASI_E_OVERFLOW, ASI_E_BUSY; else progress shows in c->string */
+ASI_MUST_USE asi_status_t asi_ctt_string(asi_ctt_t *c, unsigned index, asi_string_kind_t kind, unsigned length,
+                                         uint32_t now_us);
+#endif

@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Generate what knows the combined transactions' constants from rdl/ctt.toml: C header, Python module, document table.
+
+usage: gen_ctt.py [--check]
+  --check  change nothing; exit 1 and name the files that differ
+"""
+import argparse
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+NOTE = "Generated from rdl/ctt.toml by tools/gen_ctt.py (make regs). Do not edit."
+BEGIN, END = "<!-- ctt.toml begin -->", "<!-- ctt.toml end -->"
+
+
+def rows(text):
+    """TOML text -> [(group, key, value, experimental, doc)]; ValueError when a row lacks one of them."""
+    out = []
+    for group, keys in tomllib.loads(text).items():
+        for key, row in keys.items():
+            if set(row) != {"value", "exp", "doc"} or not isinstance(row["value"], int):
+                raise ValueError(f"rdl/ctt.toml: {group}.{key}: needs value (an integer), exp and doc, and nothing else")
+            out.append((group, key, row["value"], row["exp"], row["doc"]))
+    return out
+
+
+def c_header(table):
+    """-> text of firmware/generated/asi_ctt_table.h"""
+    lines = ["/* SPDX-License-Identifier: Apache-2.0 */", f"/* {NOTE} */",
+             "#ifndef ASI_CTT_TABLE_H", "#define ASI_CTT_TABLE_H"]
+    for group, key, value, exp, doc in table:
+        lines.append(f"#define ASI_{group.upper()}_{key.upper()} {value} /**< {'experimental: ' * exp}{doc} */")
+    return "\n".join([*lines, "#endif", ""])
+
+
+def python_module(table):
+    """-> text of host/python/asi/ctt_table.py"""
+    lines = ["# SPDX-License-Identifier: Apache-2.0", f'"""{NOTE}"""']
+    lines += [f"{group.upper()}_{key.upper()} = {value}" for group, key, value, _, _ in table]
+    return "\n".join([*lines, ""])
+
+
+def document(text, table):
+    """-> the document with its table replaced"""
+    head, rest = text.split(BEGIN)
+    tail = rest.split(END)[1]
+    body = ["| Parameter | Value | | Meaning |", "|---|---|---|---|"]
+    body += [f"| `{g}.{k}` | {v} | {'*experimental*' if e else ''} | {d} |" for g, k, v, e, d in table]
+    return head + "\n".join([BEGIN, *body, END]) + tail
+
+
+def main(argv=None):
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    p.add_argument("--check", action="store_true")
+    args = p.parse_args(argv)
+    table = rows((ROOT / "rdl/ctt.toml").read_text())
+    page = ROOT / "docs/combined_transactions.md"
+    outputs = {ROOT / "firmware/generated/asi_ctt_table.h": c_header(table),
+               ROOT / "host/python/asi/ctt_table.py": python_module(table),
+               page: document(page.read_text(), table)}
+    stale = [path for path, text in outputs.items() if not path.exists() or path.read_text() != text]
+    for path in stale:
+        if args.check:
+            print(f"{path.relative_to(ROOT)} differs from rdl/ctt.toml: make regs", file=sys.stderr)
+        else:
+            path.write_text(outputs[path])
+    return 1 if args.check and stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
