@@ -62,7 +62,7 @@ static void show_telegrams(void)
 
 void asi_diag_serve(void)
 {
-    const uint32_t now = hal_time_us();
+    const uint32_t now = asi_port_time_us();
     if (monitoring)
         show_telegrams();
     if (now - last_us < STAT_PERIOD_US)

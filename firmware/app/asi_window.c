@@ -61,7 +61,7 @@ void asi_window_publish(asi_ec_t *ec)
     WIN(SENT)[0] = counters.sent;
     WIN(REPEATED)[0] = counters.repeated;
     WIN(FAILED)[0] = counters.failed;
-    WIN(TIME_US)[0] = hal_time_us();
+    WIN(TIME_US)[0] = asi_port_time_us();
     if (asi_window_is_stale(ec)) {
         shown_version = s->version;
         WIN(FLAGS)[0] = s->flags;

@@ -34,7 +34,7 @@ void asi_interrupt(void)
         publish = asi_ec_cycle_done(&ec, &report) == ASI_OK; /* else: the last cycle before OFFLINE */
     }
     if (events & HAL_TICK) {
-        const uint32_t now = hal_time_us();
+        const uint32_t now = asi_port_time_us();
         asi_ec_tick(&ec, now - last_us);
         last_us = now;
         if (!hal_stack_intact())
@@ -51,7 +51,7 @@ int main(void)
     hal_init();
     asi_ec_init(&ec, asi_window_init());
     asi_ec_power(&ec, hal_apf());
-    last_us = hal_time_us();
+    last_us = asi_port_time_us();
     asi_window_open(&ec);
     hal_start();
     for (;;) {

@@ -41,6 +41,37 @@
 /** P_FAIL_CYCLES, cycles: the sequencer's limit of failures in a row, SLOT_STATE.streak of a lost slave (LK-004). */
 #define ASI_FAIL_CYCLES 3u
 
+/** P_RDST_EVERY, cycles: a status poll in every so many cycles without other management (EX-027). With one extra slot more
+ * polls would slow inclusion down: EX-030. */
+#ifndef ASI_RDST_EVERY
+#define ASI_RDST_EVERY 3u
+#endif
+/** P_S1_MIN_V21, 0 or 1: S1 of a slave without ID2 is ignored, before specification 2.1 it was a parity error (EX-028). */
+#ifndef ASI_S1_MIN_V21
+#define ASI_S1_MIN_V21 1
+#endif
+/** P_NVM, us: longest memory write of a slave after ADRA or WID1 (AD-005). */
+#ifndef ASI_NVM_US
+#define ASI_NVM_US 500000u
+#endif
+/** P_NVM_POLL, us: between two status reads while a slave writes (AD-005). */
+#ifndef ASI_NVM_POLL_US
+#define ASI_NVM_POLL_US 5000u
+#endif
+/** P_AUTO_WAIT, us: a failed automatic addressing is tried again after this (AD-009). */
+#ifndef ASI_AUTO_WAIT_US
+#define ASI_AUTO_WAIT_US 1000000u
+#endif
+/** P_CTT_MIN_CYCLE_US, us: shortest cycle while a combined transaction is active, so that every call of it is seen. */
+#ifndef ASI_CTT_MIN_CYCLE_US
+#define ASI_CTT_MIN_CYCLE_US 1000u
+#endif
+/** P_SUSPECT, points: a garbled answer of a slave (not a missing one) counts one up, a missing one two down, a good one in
+ * 16 cycles one down; at this many a duplicate address is suspected (EX-034). */
+#ifndef ASI_SUSPECT
+#define ASI_SUSPECT 12u
+#endif
+
 _Static_assert(ASI_CMD_RETRY <= 3u, "the request word has two bits for repetitions");
 _Static_assert(ASI_EXTRA_CALLS == 1 || ASI_EXTRA_CALLS == 2, "one or two extra slots");
 _Static_assert(ASI_INCL_MISS >= 1u && ASI_INCL_MISS <= 255u, "kept in a byte");

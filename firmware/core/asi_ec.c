@@ -1,154 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/** @file asi_ec.c  Execution control: a table of phases, batches in front of the cycle, the inclusion machine in it. */
-#include "asi_ec.h"
-#include "asi_calls.h"
-
-/* ------------------------------------------------------------------------------------------ lists and flags */
-
-static void touch(asi_ec_t *ec)
-{
-    ec->state.version++;
-}
-
-static bool is_extended(const asi_ec_t *ec, unsigned index)
-{
-    return (index & 32u) != 0u || asi_codes_id(ec->state.cdi[index]) == ASI_ID_EXTENDED;
-}
-
-/** EX-026: a B slave whose number belongs to a standard slave */
-static bool clashes(const asi_ec_t *ec, unsigned index)
-{
-    return index > 32u && asi_list_has(&ec->state.lds, index - 32u) && !is_extended(ec, index - 32u);
-}
-
-/** detected as projected */
-static bool matches(const asi_ec_t *ec, unsigned index)
-{
-    return asi_list_has(&ec->projection->lps, index) && ec->state.cdi[index] == ec->projection->pcd[index] &&
-           !clashes(ec, index);
-}
-
-/** EX-008, EX-009, EX-026 */
-static bool may_activate(const asi_ec_t *ec, unsigned index)
-{
-    if (index == 0u)
-        return false;
-    return ec->protected_mode ? matches(ec, index) : !clashes(ec, index);
-}
-
-/** Set the flags from lists, codes and controls (EX-016 .. EX-022). Called on changes only: the cycle stays short. */
-static void update_flags(asi_ec_t *ec)
-{
-    asi_ec_state_t *s = &ec->state;
-    bool all_match = true; /* no wrong, no extra slave */
-    for (unsigned i = asi_list_next(&s->lds, 1u); i < ASI_INDICES && all_match; i = asi_list_next(&s->lds, i + 1u))
-        all_match = matches(ec, i);
-    const asi_list_t missing = asi_list_without(&ec->projection->lps, &s->lds);
-    const unsigned first = asi_list_next(&missing, 0u);
-    const bool one_missing = first < ASI_INDICES && asi_list_next(&missing, first + 1u) == ASI_INDICES;
-    const bool slave0 = asi_list_has(&s->lds, 0u);
-    uint32_t flags = s->flags & (ASI_FLAG_NORMAL_OPERATION_ACTIVE | ASI_FLAG_OFFLINE_READY);
-
-    if (all_match && first == ASI_INDICES && !slave0)
-        flags |= ASI_FLAG_CONFIG_OK;
-    if (slave0)
-        flags |= ASI_FLAG_LDS0;
-    if (ec->auto_address && ec->protected_mode && all_match) {
-        flags |= ASI_FLAG_AUTO_ADDRESS_ASSIGN;
-        if (one_missing)
-            flags |= ASI_FLAG_AUTO_ADDRESS_AVAILABLE;
-    }
-    if (!ec->protected_mode)
-        flags |= ASI_FLAG_CONFIGURATION_ACTIVE;
-    if (ec->apf)
-        flags |= ASI_FLAG_APF;
-    if (asi_list_is_empty(&s->lpf))
-        flags |= ASI_FLAG_PERIPHERY_OK;
-    s->flags = flags;
-    touch(ec);
-}
-
-static void set_codes(asi_ec_t *ec, unsigned index, uint16_t codes)
-{
-    if (ec->state.cdi[index] != codes) {
-        ec->state.cdi[index] = codes;
-        asi_list_add(&ec->state.changed, index);
-    }
-}
-
-static void set_echo(asi_ec_t *ec, unsigned index, uint8_t echo)
-{
-    if (ec->state.pecho[index] != echo) {
-        ec->state.pecho[index] = echo;
-        asi_list_add(&ec->state.changed, index);
-        touch(ec);
-    }
-}
-
-/* ------------------------------------------------------------------------------------------ images */
-
-/** Line level of the outputs (CA-005): idle F, payload of active slaves inverted. I3 of A/B calls is not ours. */
-static void send_outputs(asi_ec_t *ec)
-{
-    bool changed = false;
-    for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++) {
-        const uint32_t host = ec->data_exchange ? ec->out_host[w] ^ ec->invert[w] : 0xFFFFFFFFu;
-        const uint32_t line = host | ~ec->las_mask[w];
-        changed |= line != ec->out_line[w];
-        ec->out_line[w] = line;
-    }
-    if (changed)
-        asi_port_outputs(ec->out_line);
-}
-
-/** Let the cycle run with the period that suits LAS. */
-static void run_cycle(const asi_ec_t *ec)
-{
-    const bool empty = asi_list_is_empty(&ec->state.las);
-    asi_port_cycle(true, ASI_EXTRA_CALLS == 2, empty ? ASI_EMPTY_CYCLE_US : ASI_MIN_CYCLE_US);
-}
-
-static void enter_las(asi_ec_t *ec, unsigned index)
-{
-    const bool extended = is_extended(ec, index);
-    const unsigned w = asi_word(index), shift = asi_shift(index);
-    asi_list_add(&ec->state.las, index);
-    ec->las_mask[w] |= 15u << shift;
-    ec->invert[w] |= (ASI_INVERT_OUT ? (extended ? 7u : 15u) : 0u) << shift;
-    asi_port_slot(index, true, extended);
-}
-
-static void leave_las(asi_ec_t *ec, unsigned index)
-{
-    const uint32_t others = ~(15u << asi_shift(index));
-    if (!asi_list_has(&ec->state.las, index))
-        return;
-    asi_port_slot(index, false, false);
-    asi_list_remove(&ec->state.las, index);
-    ec->las_mask[asi_word(index)] &= others;
-    ec->invert[asi_word(index)] &= others;
-    ec->state.in[asi_word(index)] &= others; /* CA-006, LK-005 */
-}
-
-/** A complete answer: into LDS and CDI (EX-004, EX-013). */
-static void enter_lds(asi_ec_t *ec, unsigned index, uint16_t codes)
-{
-    asi_list_add(&ec->state.lds, index);
-    set_codes(ec, index, codes);
-    ec->miss[index] = 0;
-    /* EX-026: the B slave of this number would hear the standard slave's calls with D3 = 0 */
-    if (index != 0u && index < 32u && !is_extended(ec, index))
-        leave_las(ec, index + 32u);
-}
-
-/** Gone (EX-014, EX-015). */
-static void leave_lds(asi_ec_t *ec, unsigned index)
-{
-    leave_las(ec, index);
-    asi_list_remove(&ec->state.lds, index);
-    set_codes(ec, index, ASI_CODES_NONE);
-    ec->miss[index] = 0;
-}
+/** @file asi_ec.c  Execution control: the phases as a table, batches in front of the cycle, reports from below. */
+#include "asi_ec_private.h"
 
 /* ------------------------------------------------------------------------------------------ batches */
 
@@ -165,18 +17,14 @@ static void send_batch(asi_ec_t *ec)
     asi_port_batch(ec->requests, ec->batch_len);
 }
 
-static void put_code(uint16_t *codes, unsigned position, unsigned nibble)
-{
-    *codes = (uint16_t)((*codes & ~(15u << position)) | nibble << position);
-}
-
 /* ------------------------------------------------------------------------------------------ the phases as a table */
 
-typedef enum { EV_NONE, EV_START, EV_STOP, EV_NOBODY, EV_FOUND, EV_TRIED } event_t;
+typedef enum { EV_NONE, EV_START, EV_STOP, EV_NOBODY, EV_FOUND, EV_TRIED, EV_AGAIN } event_t;
 
 static event_t begin_detection(asi_ec_t *ec);
 static event_t begin_activation(asi_ec_t *ec);
 static event_t begin_operation(asi_ec_t *ec);
+static event_t begin_again(asi_ec_t *ec);
 static event_t go_offline(asi_ec_t *ec);
 
 static const struct {
@@ -189,6 +37,7 @@ static const struct {
     {ASI_PHASE_DETECTION, EV_NOBODY, ASI_PHASE_DETECTION, begin_detection},       /* EX-007 */
     {ASI_PHASE_DETECTION, EV_FOUND, ASI_PHASE_ACTIVATION, begin_activation},      /* EX-004, EX-007 */
     {ASI_PHASE_ACTIVATION, EV_TRIED, ASI_PHASE_DATA_EXCHANGE, begin_operation},   /* EX-008, EX-011 */
+    {ASI_PHASE_DATA_EXCHANGE, EV_AGAIN, ASI_PHASE_ACTIVATION, begin_again},       /* EX-024 */
     {ASI_PHASE_DETECTION, EV_STOP, ASI_PHASE_OFFLINE, go_offline},                /* EX-001, EX-021, EX-023 */
     {ASI_PHASE_ACTIVATION, EV_STOP, ASI_PHASE_OFFLINE, go_offline},               /* the same */
     {ASI_PHASE_DATA_EXCHANGE, EV_STOP, ASI_PHASE_OFFLINE, go_offline},            /* the same */
@@ -205,6 +54,7 @@ static void dispatch(asi_ec_t *ec, event_t event)
                         asi_port_line(false); /* EX-001: before the phase is shown */
                     ec->state.phase = transitions[row].next;
                     asi_port_phase(ec->state.phase);
+                    ec_log(ec, ASI_EVENT_PHASE, 0u, ec->state.phase);
                     touch(ec);
                 }
                 raised = transitions[row].action(ec);
@@ -215,27 +65,44 @@ static void dispatch(asi_ec_t *ec, event_t event)
     }
 }
 
+/** The cycle does not run any more: what was open in it is gone. */
+static void end_cycle(asi_ec_t *ec)
+{
+    asi_port_cycle(0);
+    asi_port_inclusion(0);
+    ec->inclusion_open = false;
+    ec->owner = ASI_OWNER_NONE; /* the sequencer has taken it or never will: asi_port_line(false) ends it */
+    ec->reactivate = false;
+    ec->state.flags &= ~(uint32_t)ASI_FLAG_NORMAL_OPERATION_ACTIVE;
+    ec_job_abort(ec);
+}
+
 /** EX-001 */
 static event_t go_offline(asi_ec_t *ec)
 {
-    asi_port_cycle(false, false, 0);
-    asi_port_inclusion(0);
-    for (unsigned i = asi_list_next(&ec->state.las, 0u); i < ASI_INDICES; i = asi_list_next(&ec->state.las, i + 1u))
-        leave_las(ec, i);
+    end_cycle(ec);
     for (unsigned i = asi_list_next(&ec->state.lds, 0u); i < ASI_INDICES; i = asi_list_next(&ec->state.lds, i + 1u))
-        leave_lds(ec, i);
-    ec->state.lpf = ASI_LIST_EMPTY;
+        ec_leave_lds(ec, i);
     ec->batch_open = false;
-    ec->inclusion_open = false;
-    if (ec->management_open) { /* the sequencer has taken it or never will: asi_port_line(false) ends it */
-        ec->management_open = false;
-        ec->management_known = true;
-        ec->management = (asi_result_t){.error = ASI_ERR_ABORTED};
-    }
-    send_outputs(ec);
-    ec->state.flags &= ~(uint32_t)ASI_FLAG_NORMAL_OPERATION_ACTIVE;
-    update_flags(ec);
+    ec->no_id2 = ASI_LIST_EMPTY;
+    ec_send_outputs(ec);
+    ec_update_flags(ec);
     return EV_NONE;
+}
+
+void ec_stop(asi_ec_t *ec, asi_offline_cause_t cause)
+{
+    ec->state.offline_causes = (ec->state.offline_causes & 0xFFFFu) | 1u << cause | (uint32_t)cause << 16;
+    ec->state.offline_us = asi_port_time_us();
+    ec_log(ec, ASI_EVENT_OFFLINE, 0u, cause);
+    touch(ec);
+    dispatch(ec, EV_STOP);
+}
+
+void ec_reactivate(asi_ec_t *ec)
+{
+    ec->reactivate = true;
+    asi_port_cycle(0);
 }
 
 /* ------------------------------------------------------------------------------------------ DETECTION */
@@ -262,7 +129,7 @@ static event_t begin_detection(asi_ec_t *ec)
     if (ec->power_up) { /* EX-002 */
         ec->power_up = false;
         for (unsigned i = 0; i < ASI_INDICES; i++)
-            ec->state.pi[i] = ec->projection->pp[i];
+            ec->state.pi[i] = ec->permanent.projection.pp[i];
         ec->state.changed = (asi_list_t){{0xFFFFFFFFu, 0xFFFFFFFFu}};
     }
     if (ec->state.flags & ASI_FLAG_OFFLINE_READY) {
@@ -306,6 +173,8 @@ static void detection_results(asi_ec_t *ec, const asi_result_t *results)
                 put_code(codes, (k & 1u) ? 12 : 8, results[k].data);
             else if (asi_codes_id(*codes) == ASI_ID_EXTENDED)
                 asi_list_remove(&ec->todo, i);
+            else if (k & 1u)
+                asi_list_add(&ec->no_id2, i);
         }
     }
 }
@@ -315,9 +184,9 @@ static event_t detection_next(asi_ec_t *ec, const asi_result_t *results)
     detection_results(ec, results);
     if (ec->step == READ_ID12) {
         for (unsigned i = asi_list_next(&ec->todo, 0u); i < ASI_INDICES; i = asi_list_next(&ec->todo, i + 1u))
-            enter_lds(ec, i, ec->codes[i]);
+            ec_enter_lds(ec, i, ec->codes[i]);
         ec->todo = ASI_LIST_EMPTY;
-        update_flags(ec);
+        ec_update_flags(ec);
     } else {
         ec->step++;
     }
@@ -340,10 +209,10 @@ static event_t activation_batch(asi_ec_t *ec)
 {
     ec->batch_len = 0;
     for (unsigned i = asi_list_next(&ec->todo, 0u); i < ASI_INDICES; i = asi_list_next(&ec->todo, i + 1u)) {
-        const bool extended = is_extended(ec, i);
+        const bool extended = ec_is_extended(ec, i);
         if (ec->batch_len == ASI_INDICES)
             break;
-        add_request(ec, i, asi_call_wpar(i, ec->state.pi[i], extended));
+        add_request(ec, i, asi_call_wpar(i, ec_parameter(ec, i), extended));
         add_request(ec, i, asi_call_dexg(i, 15u, extended));
         asi_list_remove(&ec->todo, i);
     }
@@ -357,7 +226,7 @@ static event_t begin_activation(asi_ec_t *ec)
 {
     ec->todo = ASI_LIST_EMPTY;
     for (unsigned i = asi_list_next(&ec->state.lds, 1u); i < ASI_INDICES; i = asi_list_next(&ec->state.lds, i + 1u)) {
-        if (may_activate(ec, i))
+        if (ec_may_activate(ec, i))
             asi_list_add(&ec->todo, i);
     }
     return activation_batch(ec);
@@ -369,10 +238,10 @@ static event_t activation_next(asi_ec_t *ec, const asi_result_t *results)
         const unsigned i = ec->request_index[k];
         if (results[k].error != ASI_ERR_OK)
             continue;
-        set_echo(ec, i, results[k].data);
+        ec_set_echo(ec, i, results[k].data);
         /* the host may have changed the projection meanwhile */
-        if (results[k + 1u].error == ASI_ERR_OK && may_activate(ec, i))
-            enter_las(ec, i);
+        if (results[k + 1u].error == ASI_ERR_OK && ec_may_activate(ec, i))
+            ec_enter_las(ec, i);
     }
     return activation_batch(ec);
 }
@@ -386,123 +255,17 @@ asi_status_t asi_ec_batch_done(asi_ec_t *ec, const asi_result_t *results, unsign
     return ASI_OK;
 }
 
-/* ------------------------------------------------------------------------------------------ INCLUSION */
-
-enum { PROBE, INCLUDE_ID, INCLUDE_ID1, INCLUDE_ID2, INCLUDE_WPAR, INCLUDE_DEXG }; /* ec->inclusion_step */
-
-/** The request of this step, for all slots until the next one. A repetition is a further slot (EX-013). */
-static void inclusion_request(asi_ec_t *ec, unsigned step)
+/** EX-024: what LAS holds is activated as after detection; the slaves may have been reset meanwhile. */
+static event_t begin_again(asi_ec_t *ec)
 {
-    static const uint8_t read[] = {ASI_CMD_RDIO, ASI_CMD_RDID, ASI_CMD_RID1, ASI_CMD_RID2};
-    const unsigned i = ec->inclusion_index;
-    asi_request_t request = {.tag = ++ec->inclusion_tag, .sel = i >= 32u};
-    if (step != ec->inclusion_step)
-        ec->inclusion_failures = 0;
-    ec->inclusion_step = (uint8_t)step;
-    if (step == INCLUDE_WPAR)
-        request.call = asi_call_wpar(i, ec->state.pi[i], is_extended(ec, i));
-    else if (step == INCLUDE_DEXG)
-        request.call = asi_call_dexg(i, 15u, is_extended(ec, i));
-    else
-        request.call = asi_call_command((asi_command_t)read[step], i);
-    asi_port_inclusion(&request);
-    ec->inclusion_open = true;
-}
-
-/** EX-012: the next address not in LAS, 0 included, all of Sel = 0, then all of Sel = 1, wrapping. */
-static void probe_next(asi_ec_t *ec)
-{
-    const asi_list_t all = {{0xFFFFFFFFu, 0xFFFFFFFEu}};
-    const asi_list_t candidates = asi_list_without(&all, &ec->state.las);
-    unsigned i = asi_list_next(&candidates, ec->inclusion_index + 1u);
-    if (i == ASI_INDICES)
-        i = 0; /* always a candidate: never in LAS */
-    ec->inclusion_index = (uint8_t)i;
-    ec->inclusion_failures = 0;
-    inclusion_request(ec, PROBE);
-}
-
-/** No complete answer from the candidate in this round (EX-014). */
-static void candidate_missed(asi_ec_t *ec)
-{
-    const unsigned i = ec->inclusion_index;
-    if (asi_list_has(&ec->state.lds, i) && ++ec->miss[i] >= ASI_INCL_MISS) {
-        leave_lds(ec, i);
-        update_flags(ec);
-    }
-    probe_next(ec);
-}
-
-/** All codes are read (EX-013). */
-static void candidate_read(asi_ec_t *ec)
-{
-    const unsigned i = ec->inclusion_index;
-    const asi_list_t lds = ec->state.lds, las = ec->state.las;
-    const uint16_t codes = ec->state.cdi[i];
-    enter_lds(ec, i, ec->inclusion_codes);
-    if (codes != ec->inclusion_codes || !asi_list_equal(&lds, &ec->state.lds) ||
-        !asi_list_equal(&las, &ec->state.las)) {
-        run_cycle(ec); /* LAS may have become empty (EX-026) */
-        update_flags(ec);
-    }
-    if (may_activate(ec, i)) {
-        asi_port_forget(i); /* it may have been active before */
-        inclusion_request(ec, INCLUDE_WPAR);
-    } else {
-        probe_next(ec);
-    }
-}
-
-static void inclusion_result(asi_ec_t *ec, const asi_result_t *result)
-{
-    const unsigned i = ec->inclusion_index, step = ec->inclusion_step;
-    const bool good = result->error == ASI_ERR_OK;
-    const bool last_try = step == PROBE || ec->inclusion_failures >= ASI_CMD_RETRY;
-
-    if (!good && !last_try) { /* EX-010, one call per slot */
-        ec->inclusion_failures++;
-        inclusion_request(ec, step);
-        return;
-    }
-    switch (step) {
-    case PROBE:
-        ec->inclusion_codes = (uint16_t)(0xFFF0u | result->data);
-        if (good)
-            inclusion_request(ec, INCLUDE_ID);
-        else
-            candidate_missed(ec);
-        break;
-    case INCLUDE_ID:
-    case INCLUDE_ID1:
-    case INCLUDE_ID2:
-        if (good) {
-            put_code(&ec->inclusion_codes, 4u * step, result->data);
-        } else if (step == INCLUDE_ID || asi_codes_id(ec->inclusion_codes) == ASI_ID_EXTENDED) {
-            candidate_missed(ec);
-            break;
-        } /* else EX-005: the code stays F */
-        if (step == INCLUDE_ID2)
-            candidate_read(ec);
-        else
-            inclusion_request(ec, step + 1u);
-        break;
-    case INCLUDE_WPAR:
-        if (good && may_activate(ec, i)) { /* the projection may have changed meanwhile */
-            set_echo(ec, i, result->data);
-            inclusion_request(ec, INCLUDE_DEXG);
-        } else {
-            probe_next(ec);
-        }
-        break;
-    default: /* INCLUDE_DEXG */
-        if (good && may_activate(ec, i)) {
-            enter_las(ec, i);
-            run_cycle(ec);
-            update_flags(ec);
-        }
-        probe_next(ec);
-        break;
-    }
+    const asi_list_t las = ec->state.las;
+    end_cycle(ec);
+    for (unsigned i = asi_list_next(&las, 0u); i < ASI_INDICES; i = asi_list_next(&las, i + 1u))
+        ec_leave_las(ec, i);
+    ec->todo = las;
+    ec_send_outputs(ec);
+    ec_update_flags(ec);
+    return activation_batch(ec);
 }
 
 /* ------------------------------------------------------------------------------------------ normal operation */
@@ -510,28 +273,124 @@ static void inclusion_result(asi_ec_t *ec, const asi_result_t *result)
 static event_t begin_operation(asi_ec_t *ec)
 {
     ec->state.flags |= ASI_FLAG_NORMAL_OPERATION_ACTIVE;
-    update_flags(ec);
-    send_outputs(ec);
-    ec->inclusion_index = ASI_INDICES - 1u; /* the first probe goes to 0 */
-    probe_next(ec);
-    run_cycle(ec);
+    ec->wrong = ASI_LIST_EMPTY;
+    ec->poll_wait = 0;
+    ec_update_flags(ec);
+    ec_send_outputs(ec);
+    ec_inclusion_begin(ec);
+    ec_run_cycle(ec);
     return EV_NONE;
+}
+
+void ec_manage(asi_ec_t *ec, asi_owner_t owner, uint16_t call, unsigned index, unsigned retries, bool no_reply)
+{
+    const asi_request_t request = {.call = call, .retries = (uint8_t)retries, .tag = ++ec->management_tag,
+                                   .no_reply = no_reply, .sel = index >= 32u};
+    ec->owner = (uint8_t)owner;
+    asi_port_management(&request);
+}
+
+/** EX-027: one status read per P_RDST_EVERY cycles that nobody else needs; never between the calls of an inclusion. */
+static void poll_status(asi_ec_t *ec)
+{
+    if (ec->poll_wait < ASI_RDST_EVERY - 1u) {
+        ec->poll_wait++;
+        return;
+    }
+    if (ec->owner != ASI_OWNER_NONE || ec_inclusion_busy(ec) || asi_list_is_empty(&ec->state.las))
+        return;
+    unsigned i = asi_list_next(&ec->state.las, ec->poll_index + 1u);
+    if (i == ASI_INDICES)
+        i = asi_list_next(&ec->state.las, 0u);
+    ec->poll_index = (uint8_t)i;
+    ec->poll_wait = 0;
+    ec_manage(ec, ASI_OWNER_POLL, asi_call_command(ASI_CMD_RDST, i), i, ASI_CMD_RETRY, false);
+}
+
+static void poll_result(asi_ec_t *ec, const asi_result_t *result)
+{
+    const unsigned i = ec->poll_index;
+    const bool fault = (result->data & 2u) != 0u && !(ASI_S1_MIN_V21 && asi_list_has(&ec->no_id2, i));
+    if (result->error != ASI_ERR_OK || !asi_list_has(&ec->state.las, i) || fault == asi_list_has(&ec->state.lpf, i))
+        return;
+    if (fault)
+        asi_list_add(&ec->state.lpf, i);
+    else
+        asi_list_remove(&ec->state.lpf, i);
+    ec_log(ec, ASI_EVENT_PERIPHERY_FAULT, i, fault);
+    ec_update_flags(ec);
+}
+
+/** EX-033 */
+static void auto_clear(asi_ec_t *ec)
+{
+    const unsigned cause = ec_auto_clear_cause(ec);
+    if (cause == ASI_INDICES)
+        return;
+    ec_log(ec, ASI_EVENT_AUTO_CLEAR, cause, ec->permanent.auto_clear);
+    ec->auto_cleared = true;
+    ec->offline = true;
+    ec_stop(ec, ASI_OFFLINE_AUTO_CLEAR);
+}
+
+void asi_ec_exchange_done(asi_ec_t *ec)
+{
+    if (ec->state.phase != ASI_PHASE_DATA_EXCHANGE || !ec->permanent.data_exchange)
+        return;
+    const uint32_t now = asi_list_is_empty(&ec->ctt.live) ? 0u : asi_port_time_us();
+    for (unsigned i = asi_list_next(&ec->ctt.live, 0u); i < ASI_INDICES; i = asi_list_next(&ec->ctt.live, i + 1u)) {
+        const asi_slot_state_t slot = asi_port_slot_state(i);
+        if (slot.calls == ec->calls[i])
+            continue; /* the other one of an A/B pair was called */
+        ec->calls[i] = slot.calls;
+        const asi_ctt_call_t call = {.ok = slot.error == ASI_ERR_OK, .sent = slot.sent, .answer = slot.data,
+                                     .outputs = (uint8_t)(ec->out_host[asi_word(i)] >> asi_shift(i) & 15u), .now_us = now};
+        asi_port_live(i, asi_ctt_call(&ec->ctt, i, &call));
+    }
+}
+
+/** Inputs that are not the plain answer: combined transactions and safety slaves. */
+static void ctt_images(asi_ec_t *ec, uint32_t in[ASI_IMAGE_WORDS])
+{
+    asi_list_t called = ASI_LIST_EMPTY, failed = ASI_LIST_EMPTY;
+    const asi_list_t groups = asi_list_without(&ec->ctt.open, &ec->ctt.live);
+    for (unsigned i = asi_list_next(&groups, 0u); i < ASI_INDICES; i = asi_list_next(&groups, i + 1u)) {
+        const asi_slot_state_t slot = asi_port_slot_state(i);
+        if (slot.calls == ec->calls[i])
+            continue;
+        ec->calls[i] = slot.calls;
+        asi_list_add(&called, i);
+        if (slot.error != ASI_ERR_OK)
+            asi_list_add(&failed, i);
+    }
+    for (unsigned i = asi_list_next(&ec->ctt.live, 0u); i < ASI_INDICES; i = asi_list_next(&ec->ctt.live, i + 1u)) {
+        const unsigned w = asi_word(i), shift = asi_shift(i), answer = in[w] >> shift & 15u;
+        in[w] = (in[w] & ~(15u << shift)) | asi_ctt_inputs(&ec->ctt, i, answer) << shift;
+    }
+    asi_ctt_cycle(&ec->ctt, &ec->state.las, &called, &failed, ec->state.cdi, in, ec->out_host);
 }
 
 asi_status_t asi_ec_cycle_done(asi_ec_t *ec, const asi_cycle_report_t *report)
 {
     if (ec->state.phase != ASI_PHASE_DATA_EXCHANGE)
         return ASI_E_STATE;
-    if (ec->inclusion_open && report->inclusion.tag == ec->inclusion_tag) /* else a repeat of an older probe */
-        inclusion_result(ec, &report->inclusion);
-    if (ec->management_open && report->management.tag == ec->management_tag) {
-        ec->management_open = false;
-        ec->management_known = true;
-        ec->management = report->management;
+    ec_inclusion_result(ec, &report->inclusion);
+    if (ec->owner != ASI_OWNER_NONE && report->management.tag == ec->management_tag) {
+        const unsigned owner = ec->owner;
+        ec->owner = ASI_OWNER_NONE;
+        if (owner == ASI_OWNER_JOB)
+            ec_job_result(ec, &report->management);
+        else
+            poll_result(ec, &report->management);
     }
+    ec_job_cycle(ec);
+    poll_status(ec);
     for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++)
-        ec->state.in[w] = report->in[w] & ec->las_mask[w];
-    send_outputs(ec);
+        ec->state.in[w] = ec->permanent.data_exchange ? report->in[w] & ec->las_mask[w] : 0u;
+    if (!asi_list_is_empty(&ec->ctt.open) && ec->permanent.data_exchange)
+        ctt_images(ec, ec->state.in);
+    ec_send_outputs(ec);
+    auto_clear(ec);
     return ASI_OK;
 }
 
@@ -542,10 +401,35 @@ asi_status_t asi_ec_slave_lost(asi_ec_t *ec, const asi_list_t *lost)
     if (asi_list_is_empty(&gone))
         return ASI_E_STATE;
     for (unsigned i = asi_list_next(&gone, 0u); i < ASI_INDICES; i = asi_list_next(&gone, i + 1u))
-        leave_lds(ec, i); /* EX-015; found again by inclusion */
-    run_cycle(ec);
-    update_flags(ec);
+        ec_leave_lds(ec, i); /* EX-015; found again by inclusion */
+    if (ec->state.phase == ASI_PHASE_DATA_EXCHANGE && !ec->reactivate)
+        ec_run_cycle(ec);
+    ec_update_flags(ec);
     return ASI_OK;
+}
+
+void asi_ec_quality(asi_ec_t *ec, unsigned index, uint32_t good, uint32_t silent, uint32_t garbled)
+{
+    uint32_t points = ec->suspicion[index];
+    const bool was = asi_list_has(&ec->state.suspects, index);
+    if (garbled > 4u * silent) /* two slaves disturb each other; a dead or far one is silent */
+        points += garbled;
+    else if (silent != 0u)
+        points = points > 2u * silent ? points - 2u * silent : 0u;
+    else if (good != 0u && points != 0u)
+        points--;
+    if (points > 2u * ASI_SUSPECT)
+        points = 2u * ASI_SUSPECT;
+    ec->suspicion[index] = (uint8_t)points;
+    if (!was && points >= ASI_SUSPECT) {
+        asi_list_add(&ec->state.suspects, index);
+        ec_log(ec, ASI_EVENT_SUSPECT, index, 1u);
+        touch(ec);
+    } else if (was && points == 0u) {
+        asi_list_remove(&ec->state.suspects, index);
+        ec_log(ec, ASI_EVENT_SUSPECT, index, 0u);
+        touch(ec);
+    }
 }
 
 void asi_ec_power(asi_ec_t *ec, bool apf)
@@ -553,16 +437,19 @@ void asi_ec_power(asi_ec_t *ec, bool apf)
     if (apf == ec->apf)
         return;
     ec->apf = apf;
+    ec_log(ec, ASI_EVENT_APF, 0u, apf);
     if (apf) {
         if (ec->power_up) /* the supply was not up yet: wait from its return */
             ec->settle_left_us = ASI_PWR_SETTLE_US;
-        dispatch(ec, EV_STOP); /* EX-021 */
+        ec_stop(ec, ASI_OFFLINE_POWER); /* EX-021 */
     }
-    update_flags(ec);
+    ec_update_flags(ec);
 }
 
 void asi_ec_tick(asi_ec_t *ec, uint32_t elapsed_us)
 {
+    if (ec->reactivate && asi_port_idle())
+        dispatch(ec, EV_AGAIN);
     if (ec->state.phase != ASI_PHASE_OFFLINE)
         return;
     if (!ec->apf)
@@ -575,115 +462,4 @@ void asi_ec_tick(asi_ec_t *ec, uint32_t elapsed_us)
     } else if (!ec->offline && !ec->apf && ec->settle_left_us == 0u) {
         dispatch(ec, EV_START); /* EX-003 */
     }
-}
-
-/* ------------------------------------------------------------------------------------------ host */
-
-void asi_ec_init(asi_ec_t *ec, const asi_projection_t *projection)
-{
-    *ec = (asi_ec_t){.projection = projection, .data_exchange = true, .power_up = true,
-                     .settle_left_us = ASI_PWR_SETTLE_US};
-    for (unsigned i = 0; i < ASI_INDICES; i++) {
-        ec->state.cdi[i] = ASI_CODES_NONE;
-        ec->state.pi[i] = projection->pp[i];
-        ec->state.pecho[i] = 15u;
-    }
-    ec->state.changed = (asi_list_t){{0xFFFFFFFFu, 0xFFFFFFFFu}};
-    asi_port_phase(ASI_PHASE_OFFLINE);
-    send_outputs(ec); /* line value F */
-    update_flags(ec);
-}
-
-void asi_ec_set_mode(asi_ec_t *ec, bool protected_mode)
-{
-    if (ec->protected_mode == protected_mode)
-        return;
-    ec->protected_mode = protected_mode;
-    dispatch(ec, EV_STOP); /* EX-023 */
-    update_flags(ec);
-}
-
-void asi_ec_set_offline(asi_ec_t *ec, bool offline)
-{
-    ec->offline = offline;
-    if (offline)
-        dispatch(ec, EV_STOP);
-}
-
-void asi_ec_set_data_exchange(asi_ec_t *ec, bool active)
-{
-    ec->data_exchange = active;
-    send_outputs(ec);
-}
-
-void asi_ec_set_auto_address(asi_ec_t *ec, bool enable)
-{
-    ec->auto_address = enable;
-    update_flags(ec);
-}
-
-asi_status_t asi_ec_check_projection(const asi_projection_t *projection)
-{
-    const asi_list_t slaves = ASI_LIST_SLAVES;
-    const asi_list_t alien = asi_list_without(&projection->lps, &slaves);
-    unsigned parameters = 0;
-    for (unsigned i = 0; i < ASI_INDICES; i++)
-        parameters |= projection->pp[i];
-    return asi_list_is_empty(&alien) && parameters <= 15u ? ASI_OK : ASI_E_ARG;
-}
-
-asi_status_t asi_ec_set_projection(asi_ec_t *ec, const asi_projection_t *projection)
-{
-    const asi_status_t status = asi_ec_check_projection(projection);
-    if (status != ASI_OK)
-        return status;
-    ec->projection = projection;
-    if (ec->protected_mode && ec->state.phase == ASI_PHASE_DATA_EXCHANGE) { /* EX-009 */
-        const asi_list_t las = ec->state.las;
-        for (unsigned i = asi_list_next(&las, 0u); i < ASI_INDICES; i = asi_list_next(&las, i + 1u)) {
-            if (!may_activate(ec, i))
-                leave_las(ec, i);
-        }
-        run_cycle(ec);
-    }
-    update_flags(ec);
-    return ASI_OK;
-}
-
-void asi_ec_set_outputs(asi_ec_t *ec, const uint32_t image[ASI_IMAGE_WORDS])
-{
-    for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++)
-        ec->out_host[w] = image[w];
-}
-
-asi_status_t asi_ec_manage(asi_ec_t *ec, uint16_t call)
-{
-    const bool is_wpar = (call & 0x410u) == 0x010u && (call & 0x3E0u) != 0u;
-    const bool is_read_or_reset = (call & 0x410u) == 0x410u && call != ASI_CALL_BR01;
-    if (!asi_call_is_legal(call) || !(is_wpar || is_read_or_reset))
-        return ASI_E_ARG;
-    if (ec->state.phase != ASI_PHASE_DATA_EXCHANGE)
-        return ASI_E_STATE;
-    if (ec->management_open)
-        return ASI_E_BUSY;
-    const unsigned number = (unsigned)call >> 5 & 31u;
-    const bool extended = is_extended(ec, number) || asi_list_has(&ec->state.lds, number + 32u);
-    const asi_request_t request = {.call = call, .retries = ASI_CMD_RETRY, .tag = ++ec->management_tag, /* EX-010 */
-                                   .sel = asi_call_index(call, extended) >= 32u};
-    ec->management_open = true;
-    ec->management_known = false;
-    asi_port_management(&request);
-    return ASI_OK;
-}
-
-asi_status_t asi_ec_manage_result(const asi_ec_t *ec, asi_result_t *result)
-{
-    if (ec->management_open)
-        return ASI_E_BUSY;
-    if (!ec->management_known)
-        return ASI_E_STATE;
-    if (ec->management.error == ASI_ERR_ABORTED)
-        return ASI_E_ABORTED;
-    *result = ec->management;
-    return ASI_OK;
 }

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file asi_ec.h  Execution control of one AS-i line: OFFLINE, DETECTION, ACTIVATION, normal operation (EX-001 .. 026).
- * Layer: protocol core; knows no register and no clock. Memory: one asi_ec_t, owned by the caller, nothing else.
+ * @file asi_ec.h  Execution control of one AS-i line: OFFLINE, DETECTION, ACTIVATION, normal operation (EX-001 ..).
+ * asi_ec.c has phases and reports from below, asi_state.c lists, flags and images, asi_inclusion.c the inclusion machine,
+ * asi_functions.c what the host asks for at once, asi_jobs.c what needs telegrams.
+ * Layer: protocol core; knows no register. Memory: one asi_ec_t, owned by the caller, nothing else.
  * Context: not reentrant. All functions run in the interrupt, or with it masked.
  * Images are at host level here; the line level (CA-005) exists only below asi_port.h.
  */
@@ -10,7 +12,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include "asi_config.h"
+#include "asi_ctt.h"
+#include "asi_jobs.h"
 #include "asi_lists.h"
+#include "asi_log.h"
 #include "asi_permanent.h"
 #include "asi_port.h"
 #include "asi_status.h"
@@ -33,7 +38,7 @@ enum {
     ASI_FLAG_PERIPHERY_OK = 1u << 8,
 };
 
-/** What the master knows and shows; read only outside asi_ec.c. Consistent between two calls of this interface. */
+/** What the master knows and shows; read only for users. Consistent between two calls of this interface. */
 typedef struct {
     asi_phase_t phase;            /**< OFFLINE, DETECTION, ACTIVATION; DATA_EXCHANGE for all of normal operation */
     uint32_t flags;
@@ -43,7 +48,13 @@ typedef struct {
     uint8_t pi[ASI_INDICES];      /**< parameters sent at activation */
     uint8_t pecho[ASI_INDICES];   /**< last answer to WPAR */
     asi_list_t changed;           /**< indices whose cdi, pi or pecho changed since asi_ec_changes_taken */
-    uint32_t version;             /**< counts changes of phase, flags, lists, cdi, pi and pecho */
+    uint32_t version;             /**< counts changes of phase, flags, lists, history, cdi, pi and pecho */
+    uint32_t permanent_version;   /**< counts changes of the permanent data */
+    asi_list_t suspects;          /**< suspected duplicate addresses (EX-034) */
+    asi_list_t changed_slaves;    /**< the slaves that broke Config_OK the last time (EX-036), */
+    uint32_t changed_us;          /**< and when */
+    uint32_t offline_causes;      /**< bits of asi_offline_cause_t: 15..0 all since start-up, 31..16 the last one (EX-037), */
+    uint32_t offline_us;          /**< and when */
 } asi_ec_state_t;
 
 /** What one cycle brought. */
@@ -52,39 +63,57 @@ typedef struct {
     uint32_t in[ASI_IMAGE_WORDS]; /**< answers of the cycle */
 } asi_cycle_report_t;
 
-/** One line. All members but `state` are private to asi_ec.c. */
+/** What the host controls, apart from the projection. */
+typedef struct {
+    bool protected_mode, offline, data_exchange, auto_address;
+    uint8_t auto_clear;
+} asi_controls_t;
+
+/** Whose call is in the management slot. */
+typedef enum { ASI_OWNER_NONE, ASI_OWNER_JOB, ASI_OWNER_POLL } asi_owner_t;
+
+/** One line. All members but `state`, `ctt` and `log` are private to the core. */
 typedef struct {
     asi_ec_state_t state;
-    const asi_projection_t *projection;
-    /* host controls */
-    bool protected_mode, offline, data_exchange, auto_address;
+    asi_ctt_t ctt;
+    asi_log_t log;
+    asi_permanent_t permanent;
+    asi_job_t job;
+    bool offline, auto_cleared;   /* asked for by the host; the auto-clear end state */
     /* power-up, OFFLINE */
     bool apf, power_up;
     uint32_t settle_left_us;
     /* batches of DETECTION and ACTIVATION */
-    bool batch_open;
+    bool batch_open, reactivate;
     bool sel;                     /* detection pass over Sel = 1 */
     uint8_t step;
     uint8_t batch_len;
     asi_list_t todo;              /* slaves still in question in this step */
     asi_list_t extended_numbers;  /* detection: numbers to be tested with Sel = 1 (EX-006) */
+    asi_list_t no_id2;            /* slaves that did not answer RID2 (EX-028) */
     uint16_t codes[ASI_INDICES];  /* codes as they come; in `state.cdi` only when complete (EX-004) */
     asi_request_t requests[ASI_INDICES];
     uint8_t request_index[ASI_INDICES];
     /* normal operation */
-    bool inclusion_open, management_open, management_known;
+    bool inclusion_open;
     uint8_t inclusion_step, inclusion_index, inclusion_failures, inclusion_tag;
     uint16_t inclusion_codes;
-    uint8_t management_tag;
-    asi_result_t management;
+    bool inclusion_no_id2;
+    asi_list_t held;              /* indices inclusion keeps away from: an address is being changed */
+    uint8_t owner, management_tag;
+    uint8_t poll_index, poll_wait;
+    asi_list_t wrong;             /* slaves that are not as projected */
+    uint8_t suspicion[ASI_INDICES];
     uint8_t miss[ASI_INDICES];    /* rounds missed by a slave in LDS, not in LAS (EX-014) */
+    uint8_t calls[ASI_INDICES];   /* asi_slot_state_t.calls seen last, of combined transactions */
     uint32_t out_host[ASI_IMAGE_WORDS], out_line[ASI_IMAGE_WORDS];
     uint32_t las_mask[ASI_IMAGE_WORDS];  /* F where a slave is active */
     uint32_t invert[ASI_IMAGE_WORDS];    /* payload bits of active slaves */
 } asi_ec_t;
 
-/** Power-up: configuration mode, data exchange on, outputs 0. The projection is kept by reference; it must be valid. */
-void asi_ec_init(asi_ec_t *ec, const asi_projection_t *projection);
+/** Power-up with this permanent data, outputs 0. @return ASI_E_ARG, ASI_E_AUTO_CLEAR_MODE: it makes no sense, factory
+ * settings are used instead */
+asi_status_t asi_ec_init(asi_ec_t *ec, const asi_permanent_t *permanent);
 
 /* ---- from below ---- */
 /** Time passes; at least every few ms. elapsed_us since the last call. */
@@ -93,35 +122,17 @@ void asi_ec_tick(asi_ec_t *ec, uint32_t elapsed_us);
 void asi_ec_power(asi_ec_t *ec, bool apf);
 /** The batch ended. @return ASI_E_STATE: no batch of that length was open, nothing changed */
 asi_status_t asi_ec_batch_done(asi_ec_t *ec, const asi_result_t *results, unsigned n);
+/** The slots of a cycle have been called; the extra slots are on the line. Gives live slots their next nibbles. */
+void asi_ec_exchange_done(asi_ec_t *ec);
 /** A cycle ended. @return ASI_E_STATE: not in normal operation, nothing changed */
 asi_status_t asi_ec_cycle_done(asi_ec_t *ec, const asi_cycle_report_t *report);
 /** These slaves failed P_FAIL_CYCLES cycles and are no longer called: all at once, as after a broken cable.
  * @return ASI_E_STATE: none of them is in LAS, nothing changed */
 asi_status_t asi_ec_slave_lost(asi_ec_t *ec, const asi_list_t *lost);
+/** Attempts of an index since the last call of this function for it: good, without answer, garbled (EX-034). */
+void asi_ec_quality(asi_ec_t *ec, unsigned index, uint32_t good, uint32_t silent, uint32_t garbled);
 
-/* ---- from above ---- */
-/** Protected or configuration mode; a change passes through OFFLINE (EX-023). */
-void asi_ec_set_mode(asi_ec_t *ec, bool protected_mode);
-/** Offline phase on demand. */
-void asi_ec_set_offline(asi_ec_t *ec, bool offline);
-/** false: slaves are polled with line value F (EX-024). */
-void asi_ec_set_data_exchange(asi_ec_t *ec, bool active);
-/** Automatic addressing allowed (EX-018). */
-void asi_ec_set_auto_address(asi_ec_t *ec, bool enable);
-/** Whether this projection would be taken. Reads nothing but its argument, so it may run with the interrupt open.
- * @return ASI_E_ARG: LPS holds 0 or 32, or a parameter is above F */
-ASI_MUST_USE asi_status_t asi_ec_check_projection(const asi_projection_t *projection);
-/** Use a projection; it stays referenced. In protected mode slaves that it does not allow leave LAS at once (EX-009).
- * @return as asi_ec_check_projection; nothing changed then */
-ASI_MUST_USE asi_status_t asi_ec_set_projection(asi_ec_t *ec, const asi_projection_t *projection);
-/** Output image of the host, for the cycles from now on. */
-void asi_ec_set_outputs(asi_ec_t *ec, const uint32_t image[ASI_IMAGE_WORDS]);
-/** One call to one slave in the next management slot, P_CMD_RETRY repetitions: WPAR, RES, RDIO, RDID, RID1, RID2, RDST.
- * @return ASI_E_ARG: another call; ASI_E_STATE: no normal operation; ASI_E_BUSY: one is open */
-ASI_MUST_USE asi_status_t asi_ec_manage(asi_ec_t *ec, uint16_t call);
-/** Result of the last asi_ec_manage.
- * @return ASI_E_BUSY: not yet; ASI_E_STATE: none was asked for; ASI_E_ABORTED: the line went offline first */
-ASI_MUST_USE asi_status_t asi_ec_manage_result(const asi_ec_t *ec, asi_result_t *result);
+/* ---- from above: see asi_functions.h ---- */
 /** What the master knows and shows. */
 static inline const asi_ec_state_t *asi_ec_state(const asi_ec_t *ec) { return &ec->state; }
 /** The codes and parameters named in state.changed have been shown. */

@@ -8,10 +8,13 @@ _Static_assert(HAL_CYCLE_DONE == ASI_REGS__EVENT__CYCLE_DONE_bm && HAL_BATCH_DON
                HAL_SLAVE_LOST == ASI_REGS__EVENT__SLAVE_LOST_bm && HAL_APF_CHANGE == ASI_REGS__EVENT__APF_CHANGE_bm &&
                HAL_TICK == ASI_REGS__EVENT__TICK_bm && HAL_HOST_ATTN == ASI_REGS__EVENT__HOST_ATTN_bm &&
                HAL_EFAULT_CHANGE == ASI_REGS__EVENT__EFAULT_CHANGE_bm &&
+               HAL_EXCHANGE_DONE == ASI_REGS__EVENT__EXCHANGE_DONE_bm &&
                HAL_ALL_EVENTS == ASI_REGS__EVENT_EN__MASK_bm, "rdl/asi.rdl and asi_hal.h differ");
 
 static uint32_t ctrl;      /* CTRL as written */
 static asi_list_t slots;   /* SLOT.active as written */
+static uint32_t wanted;    /* events that raise the interrupt */
+static uint32_t live_mask[ASI_IMAGE_WORDS]; /* nibbles of live slots */
 static unsigned batch_len;
 static asi_result_t results[ASI_INDICES];
 
@@ -50,15 +53,16 @@ void asi_port_batch(const asi_request_t *requests, unsigned n)
     REG(BATCH) = n;
 }
 
-void asi_port_cycle(bool run, bool two_extra, uint16_t min_cycle_us)
+void asi_port_cycle(const asi_cycle_mode_t *mode)
 {
-    const bool starts = run && !(ctrl & ASI_REGS__CTRL__CYCLE_EN_bm);
+    const bool starts = mode && !(ctrl & ASI_REGS__CTRL__CYCLE_EN_bm);
     ctrl &= ASI_REGS__CTRL__LINE_EN_bm;
-    if (run)
-        ctrl |= ASI_REGS__CTRL__CYCLE_EN_bm | (two_extra ? ASI_REGS__CTRL__TWO_EXTRA_bm : 0u) |
-                (uint32_t)min_cycle_us << ASI_REGS__CTRL__MIN_CYCLE_US_bp;
+    if (mode)
+        ctrl |= ASI_REGS__CTRL__CYCLE_EN_bm | (mode->two_extra ? ASI_REGS__CTRL__TWO_EXTRA_bm : 0u) |
+                (mode->read_id ? ASI_REGS__CTRL__READ_ID_bm : 0u) |
+                (uint32_t)mode->min_cycle_us << ASI_REGS__CTRL__MIN_CYCLE_US_bp;
     if (starts) { /* nothing of an earlier session may show: the sequencer is idle, so its words are ours */
-        REG(EVENT) = HAL_CYCLE_DONE | HAL_SLAVE_LOST;
+        REG(EVENT) = HAL_CYCLE_DONE | HAL_SLAVE_LOST | HAL_EXCHANGE_DONE;
         LINK(MGMT_REQ)[0] = LINK(MGMT_RES)[0] & RESULT_R__TAG_bm; /* withdraws an open request */
         for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++) {
             LINK(IN_WORK)[w] = 0;
@@ -68,15 +72,46 @@ void asi_port_cycle(bool run, bool two_extra, uint16_t min_cycle_us)
     REG(CTRL) = ctrl;
 }
 
-void asi_port_slot(unsigned index, bool active, bool extended)
+void asi_port_slot(unsigned index, bool active, bool extended, bool live)
 {
+    const uint32_t nibble = 15u << asi_shift(index);
+    live_mask[asi_word(index)] &= ~nibble;
+    if (live)
+        live_mask[asi_word(index)] |= nibble;
     if (active) {
         asi_list_add(&slots, index);
         LINK(SLOT_STATE)[index] = 0; /* before active: the sequencer skips a slot with a full streak */
     } else {
         asi_list_remove(&slots, index);
     }
-    LINK(SLOT)[index] = (active ? SLOT_R__ACTIVE_bm : 0u) | (extended ? SLOT_R__EXTENDED_bm : 0u);
+    LINK(SLOT)[index] = (active ? SLOT_R__ACTIVE_bm : 0u) | (extended ? SLOT_R__EXTENDED_bm : 0u) |
+                        (live ? SLOT_R__LIVE_bm : 0u);
+    uint32_t any = 0;
+    for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++)
+        any |= live_mask[w];
+    wanted = any ? HAL_ALL_EVENTS : HAL_ALL_EVENTS & ~HAL_EXCHANGE_DONE; /* spares the core an interrupt per cycle */
+    if (REG(EVENT_EN) != 0u)
+        REG(EVENT_EN) = wanted;
+}
+
+void asi_port_live(unsigned index, unsigned nibble)
+{
+    const unsigned w = asi_word(index), shift = asi_shift(index);
+    LINK(OUT_IMG)[w] = (LINK(OUT_IMG)[w] & ~(15u << shift)) | (nibble & 15u) << shift;
+}
+
+asi_slot_state_t asi_port_slot_state(unsigned index)
+{
+    const uint32_t word = LINK(SLOT_STATE)[index];
+    return (asi_slot_state_t){.data = word & SLOT_STATE_R__DATA_bm,
+                              .error = (uint8_t)((word & SLOT_STATE_R__LAST_bm) >> SLOT_STATE_R__LAST_bp),
+                              .sent = (uint8_t)((word & SLOT_STATE_R__SENT_bm) >> SLOT_STATE_R__SENT_bp),
+                              .calls = (uint8_t)(word >> SLOT_STATE_R__CALLS_bp)};
+}
+
+uint32_t asi_port_time_us(void)
+{
+    return REG(TIME);
 }
 
 /** Inputs of a word of slots as they should stand in IN_WORK: last answers of the slots that are called. */
@@ -117,7 +152,7 @@ void asi_port_outputs(const uint32_t image[ASI_IMAGE_WORDS])
 {
     REG(CTRL) = ctrl | ASI_REGS__CTRL__OUT_HOLD_bm; /* a cycle that starts meanwhile keeps its last snapshot */
     for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++)
-        LINK(OUT_IMG)[w] = image[w];
+        LINK(OUT_IMG)[w] = (image[w] & ~live_mask[w]) | (LINK(OUT_IMG)[w] & live_mask[w]);
     REG(CTRL) = ctrl;
 }
 
@@ -131,6 +166,7 @@ void asi_port_phase(asi_phase_t phase)
 void hal_init(void)
 {
     REG(EVENT_EN) = 0;
+    wanted = HAL_ALL_EVENTS & ~HAL_EXCHANGE_DONE;
     ctrl = 0;
     REG(CTRL) = 0;
     while (!asi_port_idle()) { /* only after a restart of the program: the open batch or cycle runs out */
@@ -142,7 +178,7 @@ void hal_init(void)
 
 void hal_start(void)
 {
-    REG(EVENT_EN) = HAL_ALL_EVENTS;
+    REG(EVENT_EN) = wanted;
     hal_irq_unmask();
     hal_irq_on();
 }
@@ -188,11 +224,6 @@ asi_list_t hal_lost_slaves(void)
 bool hal_apf(void)
 {
     return (REG(STATUS) & ASI_REGS__STATUS__APF_bm) != 0u;
-}
-
-uint32_t hal_time_us(void)
-{
-    return REG(TIME);
 }
 
 hal_counters_t hal_counters(void)
@@ -271,15 +302,15 @@ void hal_host_interrupt(void)
 void hal_leave_time(void)
 {
     if (REG(EVENT) & HAL_CYCLE_DONE)
-        REG(EVENT_EN) = HAL_ALL_EVENTS & ~HAL_CYCLE_DONE;
+        REG(EVENT_EN) = wanted & ~HAL_CYCLE_DONE;
 }
 
 void hal_sleep(void)
 {
     hal_irq_off(); /* hal_leave_time may not come between the question and WAIT; WAIT ends without the interrupt too */
-    if (REG(EVENT_EN) == HAL_ALL_EVENTS)
+    if (REG(EVENT_EN) == wanted)
         (void)REG(WAIT);
-    REG(EVENT_EN) = HAL_ALL_EVENTS;
+    REG(EVENT_EN) = wanted;
     hal_irq_on();
 }
 

@@ -19,7 +19,8 @@ enum {
     HAL_TICK = 1u << 4,
     HAL_HOST_ATTN = 1u << 5,
     HAL_EFAULT_CHANGE = 1u << 6,
-    HAL_ALL_EVENTS = 0x7Fu,
+    HAL_EXCHANGE_DONE = 1u << 7,
+    HAL_ALL_EVENTS = 0xFFu,
 };
 
 typedef struct { uint32_t cycles, sent, repeated, failed; } hal_counters_t;
@@ -38,8 +39,6 @@ void hal_cycle_report(asi_cycle_report_t *report);
 asi_list_t hal_lost_slaves(void);
 /** Filtered power fail. */
 bool hal_apf(void);
-/** Bus time in us, wraps. */
-uint32_t hal_time_us(void);
 hal_counters_t hal_counters(void);
 enum { HAL_STAT_WORDS = 16 };
 /** Statistics of an index, words of stat_r in rdl/asi.rdl; each word is right, two of them may be an attempt apart. */

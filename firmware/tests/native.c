@@ -4,17 +4,16 @@
 #include <string.h>
 #include "asi_calls.h"
 #include "asi_ec.h"
+#include "asi_functions.h"
 
 static asi_ec_t ec;
 static fw_port port;
-static asi_projection_t projections[2]; /* the core keeps a reference, so a new one goes into the other */
-static unsigned used;
-
 static fw_request record(const asi_request_t *request)
 {
-    if (request->call >= 0x800u || request->retries > 3u || request->no_reply)
+    if (!asi_call_is_legal(request->call) || request->retries > 3u || request->no_reply != (request->call == ASI_CALL_BR01))
         port.violations++;
-    return (fw_request){.call = request->call, .retries = request->retries, .tag = request->tag, .sel = request->sel};
+    return (fw_request){.call = request->call, .retries = request->retries, .tag = request->tag, .sel = request->sel,
+                        .no_reply = request->no_reply};
 }
 
 /* ---- asi_port.h */
@@ -32,18 +31,20 @@ void asi_port_batch(const asi_request_t *requests, unsigned n)
     port.idle = 0;
 }
 
-void asi_port_cycle(bool run, bool two_extra, uint16_t min_cycle_us)
+void asi_port_cycle(const asi_cycle_mode_t *mode)
 {
-    if (run && (!port.line || (!port.cycle && !port.idle)))
+    if (mode && (!port.line || (!port.cycle && !port.idle)))
         port.violations++;
-    port.cycle = run;
-    port.two_extra = two_extra;
-    port.min_cycle_us = min_cycle_us;
-    if (run)
+    port.cycle = mode != 0;
+    if (mode) {
+        port.two_extra = mode->two_extra;
+        port.read_id = mode->read_id;
+        port.min_cycle_us = mode->min_cycle_us;
         port.idle = 0;
+    }
 }
 
-void asi_port_slot(unsigned index, bool active, bool extended)
+void asi_port_slot(unsigned index, bool active, bool extended, bool live)
 {
     const bool known = index < 64 && index != 0 && index != 32;
     if (!known || port.active[index] == active || (index > 32 && active && !extended)) {
@@ -52,7 +53,28 @@ void asi_port_slot(unsigned index, bool active, bool extended)
     }
     port.active[index] = active;
     port.extended[index] = extended;
+    port.live[index] = live;
+    if (active)
+        port.slot_data[index] = port.slot_error[index] = port.slot_sent[index] = port.slot_calls[index] = 0;
 }
+
+void asi_port_live(unsigned index, unsigned nibble)
+{
+    if (index >= 64 || nibble > 15)
+        port.violations++;
+    else
+        port.live_nibble[index] = (uint8_t)nibble;
+}
+
+asi_slot_state_t asi_port_slot_state(unsigned index)
+{
+    if (index >= 64 || !port.active[index])
+        port.violations++;
+    return (asi_slot_state_t){.data = port.slot_data[index & 63], .error = port.slot_error[index & 63],
+                              .sent = port.slot_sent[index & 63], .calls = port.slot_calls[index & 63] & 15};
+}
+
+uint32_t asi_port_time_us(void) { return port.time_us; }
 
 void asi_port_forget(unsigned index)
 {
@@ -96,20 +118,24 @@ void asi_port_phase(asi_phase_t phase)
 fw_port *fw_port_record(void) { return &port; }
 unsigned fw_ec_size(void) { return sizeof ec; }
 
-static asi_projection_t *fill(const uint32_t lps[2], const uint16_t pcd[64], const uint8_t pp[64])
+int fw_init(const fw_permanent *in)
 {
-    asi_projection_t *p = &projections[used ^= 1u];
-    memcpy(p->lps.w, lps, sizeof p->lps.w);
-    memcpy(p->pcd, pcd, sizeof p->pcd);
-    memcpy(p->pp, pp, sizeof p->pp);
-    return p;
-}
-
-void fw_init(const uint32_t lps[2], const uint16_t pcd[64], const uint8_t pp[64])
-{
+    asi_permanent_t p = {.protected_mode = in->controls.protected_mode, .auto_address = in->controls.auto_address,
+                         .data_exchange = in->controls.data_exchange, .auto_clear = in->controls.auto_clear};
     memset(&port, 0, sizeof port);
     port.idle = 1;
-    asi_ec_init(&ec, fill(lps, pcd, pp));
+    memcpy(p.projection.lps.w, in->lps, sizeof in->lps);
+    memcpy(p.projection.pcd, in->pcd, sizeof in->pcd);
+    memcpy(p.projection.pp, in->pp, sizeof in->pp);
+    return asi_ec_init(&ec, &p);
+}
+
+void fw_get_permanent(fw_permanent *out)
+{
+    memcpy(out->lps, ec.permanent.projection.lps.w, sizeof out->lps);
+    memcpy(out->pcd, ec.permanent.projection.pcd, sizeof out->pcd);
+    memcpy(out->pp, ec.permanent.projection.pp, sizeof out->pp);
+    fw_get_controls(&out->controls);
 }
 
 void fw_read(fw_state *out)
@@ -126,10 +152,17 @@ void fw_read(fw_state *out)
     memcpy(out->pi, s->pi, sizeof out->pi);
     memcpy(out->pecho, s->pecho, sizeof out->pecho);
     out->version = s->version;
+    out->permanent_version = s->permanent_version;
+    memcpy(out->suspects, s->suspects.w, sizeof out->suspects);
+    memcpy(out->changed_slaves, s->changed_slaves.w, sizeof out->changed_slaves);
+    out->changed_us = s->changed_us;
+    out->offline_causes = s->offline_causes;
+    out->offline_us = s->offline_us;
 }
 
 void fw_changes_taken(void) { asi_ec_changes_taken(&ec); }
 void fw_tick(uint32_t us) { asi_ec_tick(&ec, us); }
+void fw_exchange_done(void) { asi_ec_exchange_done(&ec); }
 void fw_power(int apf) { asi_ec_power(&ec, apf != 0); }
 
 static asi_result_t result_of(fw_result r)
@@ -158,28 +191,85 @@ int fw_slave_lost(const uint32_t lost[2])
     return asi_ec_slave_lost(&ec, &list);
 }
 
-void fw_set_mode(int protected_mode) { asi_ec_set_mode(&ec, protected_mode != 0); }
-void fw_set_offline(int offline) { asi_ec_set_offline(&ec, offline != 0); }
-void fw_set_data_exchange(int active) { asi_ec_set_data_exchange(&ec, active != 0); }
-void fw_set_auto_address(int enable) { asi_ec_set_auto_address(&ec, enable != 0); }
+void fw_quality(unsigned index, uint32_t good, uint32_t silent, uint32_t garbled)
+{
+    asi_ec_quality(&ec, index, good, silent, garbled);
+}
+
+int fw_set_controls(const fw_controls *c)
+{
+    const asi_controls_t controls = {.protected_mode = c->protected_mode, .offline = c->offline,
+                                     .data_exchange = c->data_exchange, .auto_address = c->auto_address,
+                                     .auto_clear = c->auto_clear};
+    return asi_fn_set_controls(&ec, &controls);
+}
+
+void fw_get_controls(fw_controls *out)
+{
+    const asi_controls_t c = asi_fn_controls(&ec);
+    *out = (fw_controls){c.protected_mode, c.offline, c.data_exchange, c.auto_address, c.auto_clear};
+}
 
 int fw_set_projection(const uint32_t lps[2], const uint16_t pcd[64], const uint8_t pp[64])
 {
-    const int status = asi_ec_set_projection(&ec, fill(lps, pcd, pp));
-    if (status != ASI_OK)
-        used ^= 1u; /* the core still uses the other one */
-    return status;
+    asi_projection_t p;
+    memcpy(p.lps.w, lps, sizeof p.lps.w);
+    memcpy(p.pcd, pcd, sizeof p.pcd);
+    memcpy(p.pp, pp, sizeof p.pp);
+    return asi_fn_set_projection(&ec, &p);
 }
 
-void fw_set_outputs(const uint32_t image[8]) { asi_ec_set_outputs(&ec, image); }
-int fw_manage(uint16_t call) { return asi_ec_manage(&ec, call); }
+int fw_set_pp(unsigned index, unsigned parameter) { return asi_fn_set_permanent_parameter(&ec, index, parameter); }
+int fw_set_pcd(unsigned index, unsigned codes) { return asi_fn_set_permanent_configuration(&ec, index, codes); }
+int fw_store_configuration(void) { return asi_fn_store_actual_configuration(&ec); }
+void fw_store_parameters(void) { asi_fn_store_actual_parameters(&ec); }
 
-int fw_manage_result(fw_result *out)
+int fw_set_lps(const uint32_t lps[2])
 {
-    asi_result_t r = {0};
-    const int status = asi_ec_manage_result(&ec, &r);
-    *out = (fw_result){.data = r.data, .error = r.error, .tag = r.tag};
-    return status;
+    const asi_list_t list = {{lps[0], lps[1]}};
+    return asi_fn_set_lps(&ec, &list);
+}
+
+void fw_set_outputs(const uint32_t image[8]) { asi_fn_write_odi(&ec, image); }
+
+int fw_start(int kind, unsigned index, unsigned value, const uint8_t *bytes, unsigned length)
+{
+    if (bytes && length <= sizeof ec.ctt.string.bytes && !ec.ctt.string.open)
+        memcpy(ec.ctt.string.bytes, bytes, length);
+    return asi_fn_start(&ec, (asi_job_kind_t)kind, index, value, length);
+}
+
+void fw_get_job(fw_job *out)
+{
+    const asi_job_t *j = asi_fn_job(&ec);
+    *out = (fw_job){.kind = j->kind, .index = j->index, .value = j->value, .data = j->data, .status = j->status,
+                    .length = j->length};
+}
+
+unsigned fw_string(uint8_t *bytes, unsigned max)
+{
+    const unsigned n = ec.ctt.string.length < max ? ec.ctt.string.length : max;
+    memcpy(bytes, ec.ctt.string.bytes, n);
+    return n;
+}
+
+void fw_set_ao(unsigned word, unsigned value) { ec.ctt.ao[word % ASI_ANALOG_WORDS] = (uint16_t)value; }
+unsigned fw_get_ai(unsigned word) { return ec.ctt.ai[word % ASI_ANALOG_WORDS]; }
+unsigned fw_ctt_status(unsigned index) { return ec.ctt.status[index & 63]; }
+
+void fw_safe_in(uint32_t f1[2], uint32_t f2[2])
+{
+    memcpy(f1, ec.ctt.safe_in[0].w, sizeof ec.ctt.safe_in[0].w);
+    memcpy(f2, ec.ctt.safe_in[1].w, sizeof ec.ctt.safe_in[1].w);
+}
+
+unsigned fw_log(fw_log_entry *out)
+{
+    for (unsigned k = 0; k < ASI_LOG_ENTRIES; k++) {
+        const asi_log_entry_t *e = &ec.log.ring[(ec.log.head + k) % ASI_LOG_ENTRIES];
+        out[k] = (fw_log_entry){e->time_us, e->event, e->index, e->data};
+    }
+    return ec.log.head;
 }
 
 int fw_call(const char *name, unsigned index, unsigned data, int extended)
