@@ -3,6 +3,7 @@
 #include "asi_diag.h"
 #include "asi_hal.h"
 #include "asi_hw.h"
+#include "hal_vexriscv.h"
 
 #define WIN(name) WINDOW(uint32_t, name)
 #define RING_RECORDS (sizeof(((asi_host_t *)0)->RING) / 8u)
@@ -60,7 +61,25 @@ static void show_telegrams(void)
     WIN(RING_LOST)[0] = dropped + hal_monitor_lost();
 }
 
-void asi_diag_serve(void)
+/** Attempts since the last copy of this index, for the suspicion of duplicate addresses. */
+static void judge(asi_ec_t *ec, volatile uint32_t *shown)
+{
+    uint32_t before[ASI_ERR_EARLY], garbled = 0;
+    for (unsigned k = 0; k < ASI_ERR_EARLY; k++)
+        before[k] = shown[k];
+    hal_stat(stat_index, shown);
+    for (unsigned k = ASI_ERR_START; k < ASI_ERR_EARLY; k++)
+        garbled += shown[k] - before[k];
+    const uint32_t good = shown[ASI_ERR_OK] - before[ASI_ERR_OK];
+    const uint32_t silent = shown[ASI_ERR_NO_RESPONSE] - before[ASI_ERR_NO_RESPONSE];
+    if (garbled == 0u && good == 0u)
+        return; /* nothing that could change anything */
+    hal_irq_off();
+    asi_ec_quality(ec, stat_index, good, silent, garbled);
+    hal_irq_on();
+}
+
+void asi_diag_serve(asi_ec_t *ec)
 {
     const uint32_t now = asi_port_time_us();
     if (monitoring)
@@ -69,6 +88,6 @@ void asi_diag_serve(void)
         return;
     last_us = now;
     WIN(LINE_FAULTS)[0] = hal_line_faults();
-    hal_stat(stat_index, WIN(STAT) + HAL_STAT_WORDS * stat_index);
+    judge(ec, WIN(STAT) + HAL_STAT_WORDS * stat_index);
     stat_index = (stat_index + 1u) % ASI_INDICES;
 }

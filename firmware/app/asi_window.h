@@ -1,28 +1,25 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file asi_window.h  The native host window (rdl/asi.rdl, asi_host): commits in, published state out (HW-001 .. 005).
- * Everything the firmware publishes changes only while IN_SEQ is odd.
+ * @file asi_window.h  The native host window (asi_host of rdl/asi.rdl): images, lists, codes, the host's commits and
+ * functions. Words of the firmware are written here and nowhere else, but for those of asi_diag.c.
  */
 #ifndef ASI_WINDOW_H
 #define ASI_WINDOW_H
-#include <stdbool.h>
 #include "asi_ec.h"
 
-#define ASI_MAGIC 0x4D495341u /* 'ASIM' */
-#define ASI_VERSION 0x00010000u /* 0.1.0: major<<24 | minor<<16 | patch */
+#define ASI_MAGIC 0x4D495341u   /* 'ASIM' */
+#define ASI_VERSION 0x00020000u /* major, minor, patch: 8, 8, 16 bits */
 
-/** Default window: configuration mode, data exchange on, outputs 0, LPS empty. MAGIC is 0 until asi_window_open.
- * @return the projection that goes with it */
-const asi_projection_t *asi_window_init(void);
-/** Publish the first state and write MAGIC, last (HW-001). */
+/** Fill the window from the permanent data; MAGIC stays 0. */
+void asi_window_init(const asi_permanent_t *permanent);
+/** The window is valid: first publication, then MAGIC (HW-001). */
 void asi_window_open(asi_ec_t *ec);
-/** Output image of the host to the core. Interrupt, or masked. */
+/** The host's outputs, digital and analog, for the next cycle. In the interrupt. */
 void asi_window_take_outputs(asi_ec_t *ec);
-/** Publish all, then raise host_irq_o once. Interrupt, or masked. */
+/** State, images, lists and counters after a cycle (HW-003 .. HW-005). In the interrupt. */
 void asi_window_publish(asi_ec_t *ec);
-/** Whether anything but images, counters and time has changed since the last publication. */
+/** True when something besides the images changed since the last publication. */
 bool asi_window_is_stale(const asi_ec_t *ec);
-/** Apply an open commit (HW-002); masks the interrupt only while the prepared change is switched on. Main loop.
- * @return true: the host wrote again meanwhile, call again */
+/** Apply the host's commit, start or finish its function (HW-002, HW-008). Main loop. @return true: call again at once */
 bool asi_window_serve(asi_ec_t *ec);
 #endif

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/** @file main.c  Line work in the interrupt; commits of the host and diagnosis in the main loop, which else sleeps. */
+/** @file main.c  Line work in the interrupt; the host's commits and functions, diagnosis and storage in the main loop. */
 #include "asi_diag.h"
 #include "asi_hal.h"
+#include "asi_hw.h"
+#include "asi_persist.h"
 #include "asi_window.h"
 
 static asi_ec_t ec;
@@ -17,6 +19,8 @@ void asi_interrupt(void)
 
     if (events & HAL_APF_CHANGE)
         asi_ec_power(&ec, hal_apf()); /* first: what a power fail has spoilt is not to be used */
+    if (events & HAL_EXCHANGE_DONE)
+        asi_ec_exchange_done(&ec); /* before anything that takes time: the next calls are near */
     if (events & HAL_BATCH_DONE) {
         const asi_result_t *results;
         const unsigned n = hal_batch_results(&results);
@@ -49,7 +53,10 @@ void asi_interrupt(void)
 int main(void)
 {
     hal_init();
-    asi_ec_init(&ec, asi_window_init());
+    const asi_permanent_t *permanent = asi_persist_open(); /* NV-009: before the first telegram */
+    (void)asi_ec_init(&ec, permanent); /* what makes no sense: factory settings, and the window shows them */
+    asi_log_put(&ec.log, asi_port_time_us(), ASI_EVENT_START, 0u, asi_persist_word() & STORE_R__STATE_bm);
+    asi_window_init(&ec.permanent);
     asi_ec_power(&ec, hal_apf());
     last_us = asi_port_time_us();
     asi_window_open(&ec);
@@ -57,7 +64,8 @@ int main(void)
     for (;;) {
         while (asi_window_serve(&ec)) {
         }
-        asi_diag_serve();
+        asi_diag_serve(&ec);
+        asi_persist_serve();
         hal_sleep();
     }
 }

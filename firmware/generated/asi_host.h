@@ -31,6 +31,9 @@ extern "C" {
 #define HOST_CTRL_R__MONITOR_bm 0x10
 #define HOST_CTRL_R__MONITOR_bp 4
 #define HOST_CTRL_R__MONITOR_bw 1
+#define HOST_CTRL_R__AUTO_CLEAR_bm 0x60
+#define HOST_CTRL_R__AUTO_CLEAR_bp 5
+#define HOST_CTRL_R__AUTO_CLEAR_bw 2
 
 // reg - flags_r
 #define FLAGS_R__CONFIG_OK_bm 0x1

@@ -302,7 +302,7 @@ void hal_host_interrupt(void)
 void hal_leave_time(void)
 {
     if (REG(EVENT) & HAL_CYCLE_DONE)
-        REG(EVENT_EN) = wanted & ~HAL_CYCLE_DONE;
+        REG(EVENT_EN) = wanted & ~(uint32_t)HAL_CYCLE_DONE;
 }
 
 void hal_sleep(void)

@@ -185,6 +185,8 @@ package asi_map_pkg;
   localparam int unsigned HostCtrlAutoAddressEnableW = 'h1;
   localparam int unsigned HostCtrlMonitorLsb = 'h4;
   localparam int unsigned HostCtrlMonitorW = 'h1;
+  localparam int unsigned HostCtrlAutoClearLsb = 'h5;
+  localparam int unsigned HostCtrlAutoClearW = 'h2;
   localparam int unsigned FlagsConfigOkLsb = 'h0;
   localparam int unsigned FlagsConfigOkW = 'h1;
   localparam int unsigned FlagsLds0Lsb = 'h1;
