@@ -500,8 +500,8 @@ async def published_together(dut):
 
 @cocotb.test(timeout_time=60, timeout_unit="ms")
 async def live_outputs(dut):
-    """LK-018, LK-006, CA-001, CA-004: OUT_IMG changes in every call: live slots follow it, the others keep the snapshot,
-    also the cycle's first slot, A and B of one number, and under out_hold."""
+    """LK-018, LK-006, CA-001, CA-004: OUT_IMG changes in every call: live slots follow it, the others keep the
+    snapshot, also the cycle's first slot, A and B of one number, and under out_hold."""
     tb = TB(dut)
     await tb.start()
     for index, slot in {1: ACTIVE | LIVE, 8: ACTIVE, 9: ACTIVE | LIVE, 20: ACTIVE | EXTENDED | LIVE,
@@ -528,15 +528,16 @@ async def live_outputs(dut):
 
 @cocotb.test(timeout_time=60, timeout_unit="ms")
 async def live_moment(dut):
-    """LK-018: the core writes a live nibble at any clock around the end of the call before: what is written by the clock
-    after the result is sent; from then to the offer the core has to wait, and what it writes is for the next call."""
+    """LK-018: the core writes a live nibble at any clock around the end of the call before: what is written by the
+    clock after the result is sent; from then to the offer the core has to wait, and what it writes is for the next
+    call."""
     tb = TB(dut)
     await tb.start()
     tb.judged = False
     for number in (3, 4, 5):
         tb.poke(number, ACTIVE | LIVE)
     dut.cycle_en_i.value = 1
-    outcome = {}                                                    # clock of the write after the result -> sent at once
+    outcome = {}  # clock of the write after the result -> sent at once
     for delay in range(CALL - 8, CALL + 24):
         value = delay % 15 + 1
         while not tb.calls or tb.calls[-1][2] >> 5 != 3:
@@ -565,8 +566,8 @@ async def live_moment(dut):
 
 @cocotb.test(timeout_time=60, timeout_unit="ms")
 async def exchange_event(dut):
-    """LK-019: exchange_done once a cycle, after the last DEXG is booked, good or failed, and before the extra slots; not
-    in a cycle without a slot. When, and with which words: checked at each event."""
+    """LK-019: exchange_done once a cycle, after the last DEXG is booked, good or failed, and before the extra slots;
+    not in a cycle without a slot. When, and with which words: checked at each event."""
     tb = TB(dut)
     await tb.start()
     count = lambda: int(dut.exchange_count_o.value)  # noqa: E731
@@ -606,8 +607,8 @@ async def exchange_event(dut):
 
 @cocotb.test(timeout_time=60, timeout_unit="ms")
 async def sent_and_calls(dut):
-    """LK-020: SLOT_STATE.sent is the information of the last call, repeated ones too, calls counts finished calls modulo
-    16, failed ones too, A and B apart; results of other calls have neither."""
+    """LK-020: SLOT_STATE.sent is the information of the last call, repeated ones too, calls counts finished calls
+    modulo 16, failed ones too, A and B apart; results of other calls have neither."""
     tb = TB(dut)
     await tb.start()
     tb.poke(6, ACTIVE | EXTENDED | LIVE)
@@ -634,8 +635,8 @@ async def sent_and_calls(dut):
 
 @cocotb.test(timeout_time=60, timeout_unit="ms")
 async def read_id(dut):
-    """LK-021, CA-003, CA-004, LK-003, LK-004: with read_id slots are called with RDID (10001, for B slaves 11001), in the
-    same order and turns, with the same repetitions and removal; a change counts from the next offer on."""
+    """LK-021, CA-003, CA-004, LK-003, LK-004: with read_id slots are called with RDID (10001, for B slaves 11001), in
+    the same order and turns, with the same repetitions and removal; a change counts from the next offer on."""
     tb = TB(dut)
     await tb.start()
     rdid, rdid_b = 0x411, 0x419

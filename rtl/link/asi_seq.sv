@@ -251,8 +251,8 @@ module asi_seq
       end
 
       // ---- next DEXG
-      // StFetch: output nibble, of a live slot from OUT_IMG. A cycle's first one comes from OUT_IMG as well; the snapshot
-      // follows without a free clock for the core, so both are of one moment, and the offer comes 15 clocks earlier.
+      // StFetch: output nibble, of a live slot from OUT_IMG. A cycle's first one comes from OUT_IMG as well; the
+      // snapshot follows without a free clock for the core, so both are of one moment; the offer is 15 clocks earlier.
       StFetch: begin
         mem_req_o = 1'b1;  mem_addr_o = {AddrImages, 1'b0, !(snap_q || live), nxt_q[5:3]};
         state_d = StLoad;

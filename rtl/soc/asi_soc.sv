@@ -157,9 +157,9 @@ module asi_soc #(
   // registered: what the core reads in WAIT does not hang on its own request in the same clock
   always_ff @(posedge clk_i)
     pending <= {8{~rst_i}} & hw_out.EVENT_EN.mask.value &
-                       {hw_out.EVENT.exchange_done.value, hw_out.EVENT.efault_change.value, hw_out.EVENT.host_attn.value,
-                        hw_out.EVENT.tick.value, hw_out.EVENT.apf_change.value, hw_out.EVENT.slave_lost.value,
-                        hw_out.EVENT.batch_done.value, hw_out.EVENT.cycle_done.value};
+               {hw_out.EVENT.exchange_done.value, hw_out.EVENT.efault_change.value, hw_out.EVENT.host_attn.value,
+                hw_out.EVENT.tick.value, hw_out.EVENT.apf_change.value, hw_out.EVENT.slave_lost.value,
+                hw_out.EVENT.batch_done.value, hw_out.EVENT.cycle_done.value};
 
   always_comb begin
     hw_in.STATUS.batch_busy.next    = batch_busy_i;
