@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Proof of asi_seq for any one number 1..31 (LK-001, LK-002, LK-004, LK-008 .. LK-010, LK-013 .. LK-017, CA-001),
-// unbounded. The link RAM keeps the words of the watched number and of the extra slots; every other word reads
-// anything at any time. asi_xact is free within what asi_xact_fv and asi_tx_fv guarantee (assumptions Line_*).
+// Proof of asi_seq for any one number 1..31 (LK-001, LK-002, LK-004, LK-008 .. LK-010, LK-013 .. LK-021, CA-001),
+// unbounded. The link RAM keeps the words of the watched number, its nibbles of OUT_IMG and OUT_SNAP, and the words of
+// the extra slots; every other word reads anything at any time. asi_xact is free within what asi_xact_fv and asi_tx_fv
+// guarantee (assumptions Line_*).
 // Firmware may write any word in any clock the sequencer leaves free, but MGMT_RES never, and MGMT_REQ not while it is
 // pending and a cycle runs.
 module asi_seq_fv import asi_map_pkg::*; (
@@ -13,7 +14,7 @@ module asi_seq_fv import asi_map_pkg::*; (
   input logic        fw_we_i, input logic [7:0] fw_addr_i, input logic [31:0] fw_data_i,
   input logic        ready_i, res_valid_i, sent_i, repeat_i,
   input logic [3:0]  res_last_i, res_first_i, res_data_i, input logic [1:0] res_repeats_i,
-  input logic        enable_i, cycle_en_i, two_extra_i, out_hold_i, tick_us_i, batch_start_i,
+  input logic        enable_i, cycle_en_i, two_extra_i, out_hold_i, read_id_i, tick_us_i, batch_start_i,
   input logic [12:0] min_cycle_us_i, input logic [6:0] batch_len_i
 );
   localparam int Attempt = 400;                // clocks from a request to its repetition or result, at least
@@ -26,10 +27,11 @@ module asi_seq_fv import asi_map_pkg::*; (
     StMgmtReq = 16, StMgmtRes = 17, StIncl = 18, StPick = 19, StCycRd = 20, StCycWr = 21, StPace = 22;
   localparam logic [7:0] Slot = 8'(LinkSlot / 4), State = 8'(LinkSlotState / 4), Batch = 8'(LinkBatch / 4),
     MgmtReq = 8'(LinkMgmtReq / 4), MgmtRes = 8'(LinkMgmtRes / 4), InclReq = 8'(LinkInclReq / 4),
-    InclRes = 8'(LinkInclRes / 4), Sent = 8'(LinkSent / 4), OutSnap = 8'(LinkOutSnap / 4),
-    InWork = 8'(LinkInWork / 4), InImg = 8'(LinkInImg / 4);
+    InclRes = 8'(LinkInclRes / 4), Sent = 8'(LinkSent / 4), OutImg = 8'(LinkOutImg / 4),
+    OutSnap = 8'(LinkOutSnap / 4), InWork = 8'(LinkInWork / 4), InImg = 8'(LinkInImg / 4);
 
   logic        mem_req, mem_we, req_valid, no_reply, sel, batch_busy, cycle_busy, batch_done, cycle_done, lost, sync;
+  logic        exchange_done;
   logic [7:0]  mem_addr;
   logic [31:0] mem_wdata, rdata_q;
   logic [10:0] call;
@@ -40,9 +42,10 @@ module asi_seq_fv import asi_map_pkg::*; (
     .mem_rdata_i(rdata_q), .req_valid_o(req_valid), .req_ready_i(ready_i), .req_call_o(call),
     .req_retries_o(retries), .req_no_reply_o(no_reply), .req_sel_o(sel),
     .res_valid_i, .res_last_i, .res_first_i, .res_data_i,
-    .res_repeats_i, .sent_i, .repeat_i, .enable_i, .cycle_en_i, .two_extra_i, .out_hold_i, .min_cycle_us_i,
-    .tick_us_i, .batch_start_i, .batch_len_i, .batch_busy_o(batch_busy), .cycle_busy_o(cycle_busy),
-    .batch_done_o(batch_done), .cycle_done_o(cycle_done), .slave_lost_o(lost), .slot_phase_o(phase), .sync_o(sync)
+    .res_repeats_i, .sent_i, .repeat_i, .enable_i, .cycle_en_i, .two_extra_i, .out_hold_i, .read_id_i,
+    .min_cycle_us_i, .tick_us_i, .batch_start_i, .batch_len_i, .batch_busy_o(batch_busy), .cycle_busy_o(cycle_busy),
+    .batch_done_o(batch_done), .cycle_done_o(cycle_done), .slave_lost_o(lost), .exchange_done_o(exchange_done),
+    .slot_phase_o(phase), .sync_o(sync)
   );
 
   // ------------------------------------------------------------------------------------------ link RAM
@@ -52,8 +55,10 @@ module asi_seq_fv import asi_map_pkg::*; (
 `else
   always_ff @(posedge clk_i) n_q <= n_q;
 `endif
-  logic [1:0]  act_q, ext_q;                   // its SLOT words: [0] A, [1] B
-  logic [2:0]  streak_q [2];                   // its SLOT_STATE words
+  logic [1:0]  act_q, ext_q, livesl_q;         // its SLOT words: [0] A, [1] B
+  logic [2:0]  streak_q [2];                   // its SLOT_STATE words: streak, sent, calls
+  logic [3:0]  inf_q [2], num_q [2];
+  logic [3:0]  img_q [2], snap_q [2];          // its nibbles of OUT_IMG, OUT_SNAP
   logic [31:0] mreq_q, ireq_q;                 // MGMT_REQ, INCL_REQ
   logic [7:0]  mres_q;                         // MGMT_RES.tag
   logic        fw, fw_slot, fw_mreq, mpend, ivalid;
@@ -67,9 +72,15 @@ module asi_seq_fv import asi_map_pkg::*; (
     word = free_i;
     for (int b = 0; b < 2; b++) begin
       if (mem_addr == Slot + 8'(32 * b) + 8'(n_q)) begin
-        word[SlotActiveLsb] = act_q[b];  word[SlotExtendedLsb] = ext_q[b];
+        word[SlotActiveLsb] = act_q[b];  word[SlotExtendedLsb] = ext_q[b];  word[SlotLiveLsb] = livesl_q[b];
       end
-      if (mem_addr == State + 8'(32 * b) + 8'(n_q)) word[SlotStateStreakLsb +: SlotStateStreakW] = streak_q[b];
+      if (mem_addr == State + 8'(32 * b) + 8'(n_q)) begin
+        word[SlotStateStreakLsb +: SlotStateStreakW] = streak_q[b];
+        word[SlotStateSentLsb +: SlotStateSentW]     = inf_q[b];
+        word[SlotStateCallsLsb +: SlotStateCallsW]   = num_q[b];
+      end
+      if (mem_addr == OutImg + 8'(4 * b) + 8'(n_q[4:3]))  word[4*n_q[2:0] +: 4] = img_q[b];
+      if (mem_addr == OutSnap + 8'(4 * b) + 8'(n_q[4:3])) word[4*n_q[2:0] +: 4] = snap_q[b];
     end
     if (mem_addr == MgmtReq) word = mreq_q;
     if (mem_addr == InclReq) word = ireq_q;
@@ -80,10 +91,21 @@ module asi_seq_fv import asi_map_pkg::*; (
     for (int b = 0; b < 2; b++) begin
       if (fw_slot && fw_addr_i[6:5] == 2'(b)) begin
         act_q[b] <= fw_data_i[SlotActiveLsb];  ext_q[b] <= fw_data_i[SlotExtendedLsb];
+        livesl_q[b] <= fw_data_i[SlotLiveLsb];
       end
-      if (fw_slot && fw_addr_i[6:5] == 2'(2 + b)) streak_q[b] <= fw_data_i[SlotStateStreakLsb +: SlotStateStreakW];
-      if (mem_req && mem_we && mem_addr == State + 8'(32 * b) + 8'(n_q))
+      if (fw_slot && fw_addr_i[6:5] == 2'(2 + b)) begin
+        streak_q[b] <= fw_data_i[SlotStateStreakLsb +: SlotStateStreakW];
+        inf_q[b] <= fw_data_i[SlotStateSentLsb +: SlotStateSentW];
+        num_q[b] <= fw_data_i[SlotStateCallsLsb +: SlotStateCallsW];
+      end
+      if (mem_req && mem_we && mem_addr == State + 8'(32 * b) + 8'(n_q)) begin
         streak_q[b] <= mem_wdata[SlotStateStreakLsb +: SlotStateStreakW];
+        inf_q[b] <= mem_wdata[SlotStateSentLsb +: SlotStateSentW];
+        num_q[b] <= mem_wdata[SlotStateCallsLsb +: SlotStateCallsW];
+      end
+      if (fw && fw_addr_i == OutImg + 8'(4 * b) + 8'(n_q[4:3]))                img_q[b]  <= fw_data_i[4*n_q[2:0] +: 4];
+      if (fw && fw_addr_i == OutSnap + 8'(4 * b) + 8'(n_q[4:3]))               snap_q[b] <= fw_data_i[4*n_q[2:0] +: 4];
+      if (mem_req && mem_we && mem_addr == OutSnap + 8'(4 * b) + 8'(n_q[4:3])) snap_q[b] <= mem_wdata[4*n_q[2:0] +: 4];
     end
     if (fw_mreq) mreq_q <= fw_data_i;
     if (fw && fw_addr_i == InclReq) ireq_q <= fw_data_i;
@@ -126,6 +148,10 @@ module asi_seq_fv import asi_map_pkg::*; (
   logic [12:0] min_q;
   logic        same_q;                         // min_cycle_us as it was then
   logic        idle_q;                         // nothing has begun since idle
+  logic        xd_q;                           // exchange_done came in this cycle
+  logic [3:0]  due_q [2];                      // nibble due if it is offered now: OUT_IMG or OUT_SNAP, one clock ago
+  logic        rid_q;                          // read_id when the present DEXG was offered
+  logic [3:0]  line_info_q;                    // I3..I0 of the last call taken
   logic        mem_state, mem_mres, mem_ires;
   assign mem_state = mem_req && mem_we && mem_addr[7:6] == State[7:6];
   assign mem_mres  = mem_req && mem_we && mem_addr == MgmtRes;
@@ -262,15 +288,20 @@ module asi_seq_fv import asi_map_pkg::*; (
     cyc_q      <= !rst_i && (begun || (cyc_q && !cycle_done && dut.state_d != StIdle));
     // calls of this cycle
     if (begun) begin
-      calls_q <= '0;  prev_q <= '0;  pos_q <= '0;  {xm_q, xi_q} <= '0;
+      calls_q <= '0;  prev_q <= '0;  pos_q <= '0;  {xm_q, xi_q, xd_q} <= '0;
       exp_v_q <= now_v;  exp_b_q <= now_b;
     end else begin
       if (taken && dexg && call[9:5] == n_q && calls_q != '1) calls_q <= calls_q + 1'b1;
       if (taken && dexg) prev_q <= call[9:5];
       if (dut.load_dexg) pos_q <= dut.nxt_q[4:0];
+      if (exchange_done) xd_q <= 1'b1;
       if (taken && mgmt) xm_q <= 1'b1;
       if (taken && incl) xi_q <= 1'b1;
     end
+    // information
+    for (int b = 0; b < 2; b++) due_q[b] <= livesl_q[b] || dut.snap_q ? img_q[b] : snap_q[b];
+    if (dut.load_dexg) rid_q <= read_id_i;
+    if (taken) line_info_q <= call[3:0];
     // searches
     if (rst_i) quiet_q <= '0;
     else if (search) begin
@@ -307,11 +338,25 @@ module asi_seq_fv import asi_map_pkg::*; (
 
     if (live_q && !rst_i) begin
       // LK-001, LK-002: exactly once per cycle, the right index, rising
-      Rising_A:   assert (!(taken && dexg) || (call[9:5] > prev_q && call[10] == 1'b0 && call[4] == 1'b0));
+      Rising_A:   assert (!(taken && dexg) || call[9:5] > prev_q);
       Twice_A:    assert (!(taken && dexg && call[9:5] == n_q) || calls_q == '0);
       Turn_A:     assert (!(taken && dexg && call[9:5] == n_q && steady_q) ||
                           (exp_v_q && sel == exp_b_q));
-      Sel_A:      assert (!(taken && dexg && call[9:5] == n_q && steady_q && ext_q[exp_b_q]) || call[3] == !exp_b_q);
+      Sel_A:      assert (!(taken && dexg && call[9:5] == n_q && steady_q && ext_q[exp_b_q] && !rid_q) ||
+                          call[3] == !exp_b_q);
+      // LK-021: DEXG or RDID
+      Code_A:     assert (!(taken && dexg) || (call[10] == rid_q && call[4] == rid_q &&
+                          (!rid_q || call[3:0] == {sel, 3'd1})));
+      // LK-018: the nibble, as it was in the clock before the offer
+      Nibble_A:   assert (!(dut.load_dexg && hit && quiet_q[0] && !read_id_i) ||
+                          (dut.call_d[2:0] == due_q[dut.nxt_q[5]][2:0] &&
+                           (ext_q[dut.nxt_q[5]] || dut.call_d[3] == due_q[dut.nxt_q[5]][3])));
+      // LK-019: once, after the last DEXG and its books, before the extra slots, in every cycle that called a slot
+      Exch_A:     assert (!exchange_done || (cyc_q && !xd_q && prev_q != '0 && !xm_q && !xi_q && !line_q &&
+                          !req_valid && last_q != ErrAborted && mem_req && mem_we && mem_addr == Sent + 8'd2));
+      ExchAll_A:  assert (!cycle_done || xd_q == (prev_q != '0));
+      ExchDexg_A: assert (!(taken && dexg) || !xd_q);
+      ExchOther_A: assert (!(taken && (mgmt || incl)) || xd_q == (prev_q != '0));
       Once_A:     assert (!(cycle_done && steady_q) || calls_q == 2'(exp_v_q));
       Retry_A:    assert (!(taken && dexg) || (retries == 2'(Retry) && !no_reply));
       // LK-015: what is switched off or lost is not called, whatever firmware writes
@@ -323,6 +368,11 @@ module asi_seq_fv import asi_map_pkg::*; (
       Lost_A:     assert (!(st == StInWr && dut.cur_q[4:0] == n_q) ||
                           lost == (!(last_q inside {ErrOk, ErrAborted}) && streak_q[dut.cur_q[5]] == 3'(Fail)));
       LostAt_A:   assert (!lost || st == StInWr);
+      // LK-020: the calls of the number that were not aborted
+      Sent_A:     assert (!(mem_state && mem_addr[4:0] == n_q) || mem_wdata[SlotStateSentLsb +: SlotStateSentW] ==
+                          (last_q == ErrAborted ? inf_q[mem_addr[5]] : line_info_q));
+      Calls_A:    assert (!(mem_state && mem_addr[4:0] == n_q) || mem_wdata[SlotStateCallsLsb +: SlotStateCallsW] ==
+                          num_q[mem_addr[5]] + 4'(last_q != ErrAborted));
       // LK-016: management
       Once1_A:    assert (!(taken && mgmt) || (mpend && !mtaken_q && {sel, retries, no_reply, call} == mreq_q[14:0]));
       Answer_A:   assert (!mem_mres || (mpend && mem_wdata[23:16] == mreq_q[23:16] && mem_wdata[7:4] == last_q &&
@@ -380,6 +430,17 @@ module asi_seq_fv import asi_map_pkg::*; (
     Paced_C:   cover (begun && !idle_q && same_q && min_cycle_us_i >= 13'd200 &&
                       us_q <= 14'(min_cycle_us_i) + 14'd2);
     Again_C:   cover (repeat_i && dexg && call[9:5] == n_q);
+    Live_C:    cover (dut.load_dexg && hit && quiet_q[0] && !read_id_i && dut.live && !dut.snap_q &&
+                      img_q[dut.nxt_q[5]] != snap_q[dut.nxt_q[5]] && prev_q != '0);
+    LiveOne_C: cover (dut.load_dexg && hit && quiet_q[0] && !read_id_i && dut.live && !dut.snap_q && prev_q == '0);
+    Snap_C:    cover (dut.load_dexg && hit && quiet_q[0] && !read_id_i && !dut.live && !dut.snap_q &&
+                      img_q[dut.nxt_q[5]] != snap_q[dut.nxt_q[5]]);
+    ReadId_C:  cover (taken && dexg && rid_q && sel && call[9:5] == n_q);
+    Exch_C:    cover (cycle_done && xd_q && (xm_q || xi_q));
+    ExchNone_C: cover (cycle_done && !xd_q);
+    ExchBad_C: cover (exchange_done && last_q != ErrOk);
+    Wraps_C:   cover (mem_state && mem_addr[4:0] == n_q && num_q[mem_addr[5]] == '1 &&
+                      mem_wdata[SlotStateCallsLsb +: SlotStateCallsW] == '0);
   end
   // ------------------------------------------------------------------------------------------ for the induction
   always_ff @(posedge clk_i) if (live_q) begin
@@ -423,12 +484,14 @@ module asi_seq_fv import asi_map_pkg::*; (
                         (st != StCopy || !dut.snap_q)));
     // the search: what was read, what was passed, what was found
     Read_I:     assert (!(st == StScan && hit) || (
-      (dut.cnt_q != 4'd1 || (rdata_q[SlotActiveLsb] == act_q[0] && rdata_q[SlotExtendedLsb] == ext_q[0])) &&
+      (dut.cnt_q != 4'd1 || (rdata_q[SlotActiveLsb] == act_q[0] && rdata_q[SlotExtendedLsb] == ext_q[0] &&
+                             rdata_q[SlotLiveLsb] == livesl_q[0])) &&
       (dut.cnt_q != 4'd2 || (dut.a_q == act_q[0] && rdata_q[SlotStateStreakLsb +: 3] == streak_q[0])) &&
-      (dut.cnt_q <  4'd2 || dut.ext_q == ext_q[0]) &&
+      (dut.cnt_q <  4'd2 || dut.opt_q == {livesl_q[0], ext_q[0]}) &&
       (dut.cnt_q <  4'd3 || (dut.a_q == callable[0] && (!dut.a_q || seen_q[0]))) &&
-      (dut.cnt_q != 4'd3 || (rdata_q[SlotActiveLsb] == act_q[1] && rdata_q[SlotExtendedLsb] == ext_q[1])) &&
-      (dut.cnt_q != 4'd4 || (dut.b_q == act_q[1] && dut.ext_b_q == ext_q[1] &&
+      (dut.cnt_q != 4'd3 || (rdata_q[SlotActiveLsb] == act_q[1] && rdata_q[SlotExtendedLsb] == ext_q[1] &&
+                             rdata_q[SlotLiveLsb] == livesl_q[1])) &&
+      (dut.cnt_q != 4'd4 || (dut.b_q == act_q[1] && dut.opt_b_q == {livesl_q[1], ext_q[1]} &&
                              rdata_q[SlotStateStreakLsb +: 3] == streak_q[1]))));
     Quiet_I:    assert ((!quiet_q[2] || quiet_q[1]) && (!quiet_q[1] || quiet_q[0]));
     Number_I:   assert (!(over && dut.nxt_v_q) || scan_n != '0);
@@ -444,22 +507,32 @@ module asi_seq_fv import asi_map_pkg::*; (
     Passed_I:   assert (!(quiet_q[2] && (st == StScan || (over && dut.nxt_v_q)) && passed) || !now_v);
     None_I:     assert (!(quiet_q[2] && over && !dut.nxt_v_q) || !now_v);
     Found_I:    assert (!(over && dut.nxt_v_q && hit) || (seen_q[dut.nxt_q[5]] && (!quiet_q[0] ||
-                        (dut.ext_q == ext_q[dut.nxt_q[5]] && (callable[dut.nxt_q[5]] || losing)))));
+                        (dut.opt_q == {livesl_q[dut.nxt_q[5]], ext_q[dut.nxt_q[5]]} &&
+                        (callable[dut.nxt_q[5]] || losing)))));
     Turn_I:     assert (!(over && dut.nxt_v_q && hit && quiet_q[1]) || losing ||
                         dut.nxt_q[5] == (callable[1] && (!callable[0] || target)));
     Losing_I:   assert (!(losing && hit && quiet_q[2]) || !now_v);
     LostQ_I:    assert (!(st inside {StInRd, StInWr} && dut.cur_q[4:0] == n_q) || dut.lost_q ==
                         (!(last_q inside {ErrOk, ErrAborted}) && streak_q[dut.cur_q[5]] == 3'(Fail)));
     ReadSt_I:   assert (!(st == StResWr && dexg && dut.cur_q[4:0] == n_q) ||
-                        rdata_q[SlotStateStreakLsb +: 3] == streak_q[dut.cur_q[5]]);
+                        (rdata_q[SlotStateStreakLsb +: 3] == streak_q[dut.cur_q[5]] &&
+                        rdata_q[SlotStateSentLsb +: 4] == inf_q[dut.cur_q[5]] &&
+                        rdata_q[SlotStateCallsLsb +: 4] == num_q[dut.cur_q[5]]));
     Cur_I:      assert (!(dexg && (dut.open_q || st inside {StStateRd, StResWr}) && pos_q == n_q) ||
                         ((!quiet_q[1] || callable[dut.cur_q[5]]) && (!quiet_q[2] || dut.cur_q[5] == now_b)));
     Pos_I:      assert (!(dexg && (dut.open_q || books)) || (dut.cur_q[4:0] == pos_q && pos_q != '0));
     Call_I:     assert (!(dexg && dut.open_q) || (dut.call_q[9:5] == pos_q && dut.sel_q == dut.cur_q[5] &&
-                        !dut.call_q[10] && !dut.call_q[4] &&
+                        dut.call_q[10] == rid_q && dut.call_q[4] == rid_q &&
+                        (!rid_q || dut.call_q[3:0] == {dut.sel_q, 3'd1}) &&
                         dut.retries_q == 2'(Retry) && !dut.no_reply_q));
-    Sel_I:      assert (!(dexg && dut.valid_q && steady_q && pos_q == n_q && ext_q[dut.cur_q[5]]) ||
+    Info_I:     assert (!(dexg && (dut.open_q || st inside {StStateRd, StResWr})) || gone_q ||
+                        dut.tag_q[7:4] == (dut.valid_q ? dut.call_q[3:0] : line_info_q));
+    Sel_I:      assert (!(dexg && dut.valid_q && steady_q && pos_q == n_q && ext_q[dut.cur_q[5]] && !rid_q) ||
                         dut.call_q[3] == !dut.cur_q[5]);
+    // exchange_done
+    PrevAt_I:   assert (!(cyc_q && dexg && (dut.open_q || books) && !dut.valid_q && !gone_q) || prev_q == pos_q);
+    PrevEx_I:   assert (!(cyc_q && extra) || prev_q == pos_q);
+    Exch_I:     assert (!cyc_q || xd_q == (extra && pos_q != '0));
     // the calls of the cycle
     Steady_I:   assert (!(cyc_q && steady_q) || quiet_q[2]);
     Prev_I:     assert (!cyc_q || prev_q < pos_q || (prev_q == pos_q && !(dexg && dut.valid_q)));

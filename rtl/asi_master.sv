@@ -54,11 +54,11 @@ module asi_master #(
   output logic        core_wait_o                     // the core sleeps in WAIT
 );
   // ---------------------------------------------------------------- core, memories, registers, host window
-  logic        tick_us, line_en, cycle_en, two_extra, out_hold, batch_start;
+  logic        tick_us, line_en, cycle_en, two_extra, out_hold, read_id, batch_start;
   logic [12:0] min_cycle_us;
   logic [6:0]  batch_len;
   logic [2:0]  exec_phase, slot_phase;
-  logic        batch_busy, cycle_busy, cycle_done, batch_done, slave_lost, apf, efault;
+  logic        batch_busy, cycle_busy, cycle_done, exchange_done, batch_done, slave_lost, apf, efault;
   logic        jabber, mon_enable, mon_clear;
   logic [7:0]  mon_tail, mon_head;
   logic [15:0] mon_lost;
@@ -82,10 +82,12 @@ module asi_master #(
     .ring_req_i(ring_req), .ring_we_i(ring_we), .ring_addr_i(ring_addr), .ring_wdata_i(ring_wdata),
     .seq_req_i(mem_req), .seq_we_i(mem_we), .seq_addr_i(mem_addr), .seq_wdata_i(mem_wdata), .seq_rdata_o(mem_rdata),
     .tick_us_o(tick_us), .line_en_o(line_en), .cycle_en_o(cycle_en), .two_extra_o(two_extra),
-    .out_hold_o(out_hold), .min_cycle_us_o(min_cycle_us), .batch_start_o(batch_start), .batch_len_o(batch_len),
+    .out_hold_o(out_hold), .read_id_o(read_id), .min_cycle_us_o(min_cycle_us),
+    .batch_start_o(batch_start), .batch_len_o(batch_len),
     .exec_phase_o(exec_phase),
     .batch_busy_i(batch_busy), .cycle_busy_i(cycle_busy), .apf_i(apf), .efault_i(efault),
-    .cycle_done_i(cycle_done), .batch_done_i(batch_done), .slave_lost_i(slave_lost), .jabber_i(jabber),
+    .cycle_done_i(cycle_done), .exchange_done_i(exchange_done), .batch_done_i(batch_done), .slave_lost_i(slave_lost),
+    .jabber_i(jabber),
     .mon_enable_o(mon_enable), .mon_clear_o(mon_clear), .mon_tail_o(mon_tail), .mon_head_i(mon_head),
     .mon_lost_i(mon_lost),
     .core_wait_o
@@ -114,10 +116,10 @@ module asi_master #(
     .req_no_reply_o(req_no_reply), .req_sel_o(req_sel),
     .res_valid_i(res_valid), .res_last_i(res_last), .res_first_i(res_first), .res_data_i(res_data),
     .res_repeats_i(res_repeats), .sent_i(sent), .repeat_i(is_repeat),
-    .enable_i(enable), .cycle_en_i(cycle_en), .two_extra_i(two_extra), .out_hold_i(out_hold),
+    .enable_i(enable), .cycle_en_i(cycle_en), .two_extra_i(two_extra), .out_hold_i(out_hold), .read_id_i(read_id),
     .min_cycle_us_i(min_cycle_us), .tick_us_i(tick_us), .batch_start_i(batch_start), .batch_len_i(batch_len),
     .batch_busy_o(batch_busy), .cycle_busy_o(cycle_busy), .batch_done_o(batch_done), .cycle_done_o(cycle_done),
-    .slave_lost_o(slave_lost), .slot_phase_o(slot_phase), .sync_o
+    .slave_lost_o(slave_lost), .exchange_done_o(exchange_done), .slot_phase_o(slot_phase), .sync_o
   );
 
   asi_xact #(

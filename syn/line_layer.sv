@@ -4,7 +4,8 @@
 module line_layer
   import asi_map_pkg::*;
 (
-  input  logic        clk_i, rst_i, enable_i, cycle_en_i, two_extra_i, out_hold_i, tick_us_i, batch_start_i,
+  input  logic        clk_i, rst_i, enable_i, cycle_en_i, two_extra_i, out_hold_i, read_id_i, tick_us_i,
+  input  logic        batch_start_i,
   input  logic [12:0] min_cycle_us_i,
   input  logic [6:0]  batch_len_i,
   input  logic        rx_p_i, rx_n_i, apf_ni, efault_i,
@@ -15,7 +16,7 @@ module line_layer
   output logic [9:0]  stat_addr_o,
   output logic [31:0] mem_wdata_o, stat_wdata_o,
   input  logic [31:0] mem_rdata_i, stat_rdata_i,
-  output logic        batch_busy_o, cycle_busy_o, batch_done_o, cycle_done_o, slave_lost_o, sync_o,
+  output logic        batch_busy_o, cycle_busy_o, batch_done_o, cycle_done_o, exchange_done_o, slave_lost_o, sync_o,
   output logic [2:0]  slot_phase_o
 );
   logic         req_valid, req_ready, req_no_reply, req_sel, res_valid, sent, is_repeat, man, man_en, pulse_n, pulse_p;
@@ -33,8 +34,9 @@ module line_layer
     .req_valid_o(req_valid), .req_ready_i(req_ready), .req_call_o(req_call), .req_retries_o(req_retries),
     .req_no_reply_o(req_no_reply), .req_sel_o(req_sel), .res_valid_i(res_valid), .res_last_i(res_last),
     .res_first_i(res_first), .res_data_i(res_data), .res_repeats_i(res_repeats), .sent_i(sent), .repeat_i(is_repeat),
-    .enable_i, .cycle_en_i, .two_extra_i, .out_hold_i, .min_cycle_us_i, .tick_us_i, .batch_start_i, .batch_len_i,
-    .batch_busy_o, .cycle_busy_o, .batch_done_o, .cycle_done_o, .slave_lost_o, .slot_phase_o, .sync_o
+    .enable_i, .cycle_en_i, .two_extra_i, .out_hold_i, .read_id_i, .min_cycle_us_i, .tick_us_i, .batch_start_i,
+    .batch_len_i, .batch_busy_o, .cycle_busy_o, .batch_done_o, .cycle_done_o, .slave_lost_o, .exchange_done_o,
+    .slot_phase_o, .sync_o
   );
   asi_xact u_xact (
     .clk_i, .rst_i, .enable_i, .req_valid_i(req_valid), .req_ready_o(req_ready), .req_call_i(req_call),

@@ -2,7 +2,7 @@
 // Simulation of the proof harness of asi_seq: random inputs that keep its assumptions, so that its rules are also
 // checked over whole cycles from reset, and its covers show that the rules had something to check.
 module asi_seq_rules_tb import asi_map_pkg::*; (input logic clk_i, rst_i, input logic [4:0] n_i);
-  logic        ready_q, again_q, end_q, enable_q, run_q, two_q, hold_q, fail_q, alone_q, start_q, try_q, touch_q;
+  logic        ready_q, again_q, end_q, enable_q, run_q, two_q, hold_q, rid_q, fail_q, alone_q, start_q, try_q, touch_q;
   logic        slow_q, hurry_q;
   logic [3:0]  class_q;
   logic [2:0]  tick_q;
@@ -22,8 +22,8 @@ module asi_seq_rules_tb import asi_map_pkg::*; (input logic clk_i, rst_i, input 
     .clk_i, .rst_i, .n_i, .free_i(free_q), .fw_we_i(fw), .fw_addr_i(addr_q), .fw_data_i(data_q), .ready_i(ready_q),
     .res_valid_i(res), .sent_i(sent), .repeat_i(repeating), .res_last_i(enable_q ? class_q : ErrAborted),
     .res_first_i(class_q), .res_data_i(data_q[3:0]), .res_repeats_i(data_q[5:4]), .enable_i(enable_q),
-    .cycle_en_i(run_q && enable_q), .two_extra_i(two_q), .out_hold_i(hold_q), .tick_us_i(tick_q == '0),
-    .batch_start_i(start_q), .min_cycle_us_i(min_q), .batch_len_i(len_q)
+    .cycle_en_i(run_q && enable_q), .two_extra_i(two_q), .out_hold_i(hold_q), .read_id_i(rid_q),
+    .tick_us_i(tick_q == '0), .batch_start_i(start_q), .min_cycle_us_i(min_q), .batch_len_i(len_q)
   );
 
   function automatic logic one_in(int unsigned n);
@@ -56,6 +56,8 @@ module asi_seq_rules_tb import asi_map_pkg::*; (input logic clk_i, rst_i, input 
     try_q  <= one_in(4);
     data_q <= {one_in(2), 7'($urandom), 8'($urandom), 16'($urandom)};
     addr_q <= one_in(hurry_q ? 10 : 200) ? 8'(LinkMgmtReq / 4) : one_in(400) ? 8'(LinkInclReq / 4) : 8'hFF;
+    if (rst_i || one_in(2_000)) rid_q <= one_in(4);
+    if (one_in(300)) addr_q <= 8'(LinkOutImg / 4) | {5'd0, 1'($urandom), n_i[4:3]};
     if (rst_i || one_in(touch_q ? 2_000 : 20_000)) begin
       addr_q <= {1'b0, 2'($urandom), n_i};
       data_q <= {13'($urandom), 3'($urandom_range(3)), 14'($urandom), one_in(2), !one_in(4)};

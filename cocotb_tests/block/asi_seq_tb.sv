@@ -7,7 +7,8 @@ module asi_seq_tb
 #(
   parameter int unsigned DexgRetry = 1, FailCycles = 3, ClkMhz = 8
 ) (
-  input  logic        clk_i, rst_i, enable_i, cycle_en_i, two_extra_i, out_hold_i, batch_start_i,
+  input  logic        clk_i, rst_i, enable_i, cycle_en_i, two_extra_i, out_hold_i, read_id_i,
+  input  logic        batch_start_i,
   input  logic [12:0] min_cycle_us_i,
   input  logic [6:0]  batch_len_i,
   // answer to the open call: classes, data, repetitions made; clocks per attempt; gap after the result, in clocks
@@ -27,6 +28,7 @@ module asi_seq_tb
   output logic        req_valid_o,
   // events, counted
   output logic [15:0] cycle_count_o, batch_count_o, lost_count_o, sync_count_o, res_count_o, begun_count_o,
+  output logic [15:0] exchange_count_o,
   output logic [31:0] sync_time_o, offer_max_o,
   output logic        batch_busy_o, cycle_busy_o,
   // core
@@ -36,6 +38,7 @@ module asi_seq_tb
   output logic        core_ack_o  // the write is done at the end of this clock
 );
   logic        mem_req, mem_we, req_valid, req_ready, res_valid, sent, again, batch_done, cycle_done, slave_lost, sync;
+  logic        exchange_done;
   logic [7:0]  mem_addr;
   logic [31:0] mem_wdata, mem_rdata;
   logic [10:0] req_call;
@@ -50,9 +53,9 @@ module asi_seq_tb
     .req_retries_o(req_retries), .req_no_reply_o(req_no_reply), .req_sel_o(unused_sel), .res_valid_i(res_valid),
     .res_last_i(res_last), .res_first_i(res_first), .res_data_i(rsp_data_i), .res_repeats_i(attempt), .sent_i(sent),
     .repeat_i(again),
-    .enable_i, .cycle_en_i, .two_extra_i, .out_hold_i, .min_cycle_us_i, .tick_us_i(tick), .batch_start_i, .batch_len_i,
-    .batch_busy_o, .cycle_busy_o, .batch_done_o(batch_done), .cycle_done_o(cycle_done), .slave_lost_o(slave_lost),
-    .slot_phase_o(slot_phase), .sync_o(sync)
+    .enable_i, .cycle_en_i, .two_extra_i, .out_hold_i, .read_id_i, .min_cycle_us_i, .tick_us_i(tick), .batch_start_i,
+    .batch_len_i, .batch_busy_o, .cycle_busy_o, .batch_done_o(batch_done), .cycle_done_o(cycle_done),
+    .slave_lost_o(slave_lost), .exchange_done_o(exchange_done), .slot_phase_o(slot_phase), .sync_o(sync)
   );
 
   // link RAM; the sequencer wins
@@ -78,6 +81,7 @@ module asi_seq_tb
     if (rst_i) begin
       {busy, sent, again, attempt, left, gap, late, since} <= '0;
       {acc_count_o, cycle_count_o, batch_count_o, lost_count_o, sync_count_o, res_count_o, begun_count_o} <= '0;
+      exchange_count_o <= '0;
       time_o <= '0;
       tick <= 1'b0;
     end else begin
@@ -107,6 +111,7 @@ module asi_seq_tb
       lost_count_o  <= lost_count_o + 16'(slave_lost);
       sync_count_o  <= sync_count_o + 16'(sync);
       if (sync) sync_time_o <= time_o;
+      exchange_count_o <= exchange_count_o + 16'(exchange_done);
     end
 
   // longest time from a result to the next offer, over calls that directly follow each other

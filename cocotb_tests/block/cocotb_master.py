@@ -8,7 +8,7 @@ from cocotb_tests.block.cocotb_soc import LINK, TB, reg
 
 BATCH, SLOT, STATE = (LINK + getattr(regmap, f"LINK_{n}") for n in ("BATCH", "SLOT", "SLOT_STATE"))
 NO_RESPONSE, ABORTED = 1, 15
-BATCH_DONE, CYCLE_DONE, APF_CHANGE, EFAULT_CHANGE = 2, 1, 8, 64
+BATCH_DONE, CYCLE_DONE, APF_CHANGE, EFAULT_CHANGE, EXCHANGE_DONE = 2, 1, 8, 64, 128
 APF_LATCH, EFAULT_LATCH, JABBER_LATCH = 1, 2, 4
 OFFLINE, DETECTION, DATA_EXCHANGE = 0, 1, 3
 
@@ -262,3 +262,39 @@ async def cycle_on_the_line(dut):
     assert min(periods) >= 1000 * tb.us, periods
     assert max(periods[1:]) - min(periods[1:]) <= 1, periods       # the first cycle starts from rest
 
+
+@cocotb.test(timeout_time=50, timeout_unit="ms")
+async def exchange_on_the_line(dut):
+    """LK-018, LK-019, LK-020, LK-021: the core takes exchange_done while the extra call is on the line, reads what each
+    slave got and answered, writes the next live nibble, and the next call has it. With read_id the slots get RDID."""
+    tb = MasterTB(dut)
+    await tb.power_up()
+    for word in range(0x200, 0x3A0, 4):
+        await tb.poke(LINK + word, 0)
+    for index, slot in ((5, 0b101), (9, 0), (41, 0b011)):           # 5 live, 9B
+        await tb.poke(STATE + 4 * index, 0)
+        await tb.poke(SLOT + 4 * index, slot)
+    for index, data, code in ((5, 0xB, 5), (41, 0x6, 9)):
+        tb.answers |= {telegram.encode_call("DEXG", index, k): data for k in range(16)}
+        tb.answers[telegram.encode_call("RDID", index)] = code
+    extra = telegram.encode_call("RDIO", 20)                        # nobody there
+    await tb.poke(link("INCL_REQ"), extra | 1 << 31)
+    await tb.poke(reg("EVENT"), EXCHANGE_DONE)
+    await tb.poke(reg("CTRL"), 8 | 1)
+    expected = []
+    for k in range(6):
+        await tb.event(EXCHANGE_DONE)
+        await tb.poke(link("OUT_IMG"), (k + 7 & 15) << 20)          # index 5
+        states = [await tb.peek(STATE + 4 * index) for index in (5, 41)]
+        assert len(tb.trains) == 3 * (k + 1), "the core was too late"
+        sent = 0 if k == 0 else k + 6
+        assert states == [0xB | sent << 20 | (k + 1) << 28, 6 | (k + 1) << 28]
+        expected += [telegram.encode_call("DEXG", 5, sent), telegram.encode_call("DEXG", 41, 0), extra]
+        if k == 5:
+            await tb.poke(reg("CTRL"), 8 | 1 | 16)
+    await tb.event(EXCHANGE_DONE)
+    await tb.poke(reg("CTRL"), 8 | 16)
+    await tb.poke(reg("EVENT"), CYCLE_DONE)
+    assert [await tb.peek(STATE + 4 * index) for index in (5, 41)] == [5 | 1 << 20 | 7 << 28, 9 | 9 << 20 | 7 << 28]
+    await tb.event(CYCLE_DONE)
+    assert tb.calls() == expected + [telegram.encode_call("RDID", 5), telegram.encode_call("RDID", 41), extra]

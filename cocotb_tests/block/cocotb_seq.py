@@ -15,6 +15,8 @@ DEXG, MGMT, INCL = 3, 4, 5                 # phase_e while the call is on the li
 STATE, BATCH, OUT_IMG, OUT_SNAP, IN_WORK, IN_IMG = 0x40, 0x80, 0xC0, 0xC8, 0xD0, 0xD8
 MGMT_REQ, MGMT_RES, INCL_REQ, INCL_RES, SENT, REPEATED, FAILED, CYCLES = range(0xE0, 0xE8)
 VALID = 1 << 31
+ACTIVE, EXTENDED, LIVE = 1, 2, 4           # SLOT
+EXCHANGE = "exchange_done"
 CALL, GAP, US = 350, 48, 8
 OFFER_MAX = 36                             # longest time from a result to the next offer, any path
 
@@ -28,11 +30,13 @@ def nibble(ram, base, index):
 
 
 class Model:
-    """The rules of the cycle on a link RAM of its own. A cycle is a generator of requests; results are sent in."""
+    """The rules of the cycle on a link RAM of its own. A cycle is a generator of requests; results are sent in. It
+    also yields EXCHANGE, where exchange_done is due, with every word as it must be then."""
 
     def __init__(self, fail_cycles, dexg_retry):
         self.ram, self.odd, self.was_mgmt, self.lost = [0] * 256, 0, False, 0
         self.fail_cycles, self.dexg_retry = fail_cycles, dexg_retry
+        self.read_id = lambda: False
 
     def count(self, result):
         last, _, _, repeats = result
@@ -47,10 +51,20 @@ class Model:
         word = IN_WORK + index // 8
         self.ram[word] = self.ram[word] & ~(15 << 4 * (index % 8)) | value << 4 * (index % 8)
 
-    def book_slot(self, index, result):
+    def slot_call(self, index):
+        """-> the request word of a slot, as of now."""
+        number, b = index & 31, index >> 5
+        if self.read_id():
+            return 1 << 10 | number << 5 | 0b10001 ^ b << 3
+        out = nibble(self.ram, OUT_IMG if self.ram[index] & LIVE else OUT_SNAP, index)
+        return number << 5 | (out & 7 | (1 - b) << 3 if self.ram[index] & EXTENDED else out)
+
+    def book_slot(self, index, call, result):
         last, first, data, repeats = result
         old = self.ram[STATE + index]
-        value, streak = old & 15, old >> 16 & 7
+        value, streak, sent, calls = old & 15, old >> 16 & 7, old >> 20 & 15, old >> 28
+        if last != ABORTED:
+            sent, calls = call & 15, calls + 1 & 15
         if last == OK:
             value, streak = data, 0
             self.set_input(index, data)
@@ -59,7 +73,8 @@ class Model:
             if streak == self.fail_cycles:
                 self.set_input(index, 0)
                 self.lost += 1
-        self.ram[STATE + index] = value | last << 4 | first << 8 | repeats << 12 | streak << 16
+        self.ram[STATE + index] = (value | last << 4 | first << 8 | repeats << 12 | streak << 16 | sent << 20 |
+                                   calls << 28)
         self.count(result)
 
     def book(self, word, tag, result):
@@ -78,6 +93,7 @@ class Model:
         ram = self.ram
         if not hold:
             ram[OUT_SNAP:OUT_SNAP + 8] = ram[OUT_IMG:OUT_IMG + 8]
+        called = False
         for number in range(1, 32):
             a, b = number, number + 32
             if self.callable(a) and self.callable(b):
@@ -86,13 +102,13 @@ class Model:
                 index = a if self.callable(a) else b
             else:
                 continue
-            out = nibble(ram, OUT_SNAP, index)
-            if ram[index] & 2:
-                out = out & 7 | (0 if index > 31 else 8)
-            result = yield DEXG, number << 5 | out, self.dexg_retry, 0
-            self.book_slot(index, result)
+            call, called = self.slot_call(index), True
+            result = yield DEXG, call, self.dexg_retry, 0
+            self.book_slot(index, call, result)
             if result[0] == ABORTED:
                 return
+        if called:
+            yield EXCHANGE
         pending = (ram[MGMT_REQ] ^ ram[MGMT_RES]) >> 16 & 255 != 0
         if two_extra:
             self.was_mgmt = pending
@@ -121,17 +137,18 @@ class TB:
         self.dut = dut
         self.model = Model(int(dut.FailCycles.value), int(dut.DexgRetry.value))
         self.words = [dut.ram[k] for k in range(256)]
+        self.model.read_id = lambda: int(dut.read_id_i.value)
         self.answer = lambda call: (OK, OK, call >> 5 & 15, 0)
         self.on_call = lambda count: None
         self.length = lambda call: CALL
-        self.calls, self.gen, self.pending_result = [], None, None
+        self.calls, self.gen, self.pending_result, self.exchanged = [], None, None, False
         self.judged = self.strict = True   # judged: compare with the model; strict: no offer may be late
         self.checked = self.published = self.dropped = 0  # dropped: cycles begun, but ended without publication
         Clock(dut.clk_i, 125, unit="ns").start()
 
     async def start(self):
         dut = self.dut
-        for pin in (dut.cycle_en_i, dut.two_extra_i, dut.out_hold_i, dut.batch_start_i, dut.batch_len_i,
+        for pin in (dut.cycle_en_i, dut.two_extra_i, dut.out_hold_i, dut.read_id_i, dut.batch_start_i, dut.batch_len_i,
                     dut.min_cycle_us_i, dut.core_req_i, dut.core_addr_i, dut.core_wdata_i, dut.rsp_last_i,
                     dut.rsp_first_i, dut.rsp_data_i, dut.rsp_repeats_i):
             pin.value = 0
@@ -146,6 +163,7 @@ class TB:
         await FallingEdge(dut.clk_i)
         cocotb.start_soon(self._serve())
         cocotb.start_soon(self._publish())
+        cocotb.start_soon(self._exchange())
 
     def poke(self, word, value):
         """Firmware writes, at once."""
@@ -166,7 +184,8 @@ class TB:
         return int(dut.res_last_o.value), int(dut.res_first_o.value), data, int(dut.res_repeats_o.value)
 
     def _advance(self):
-        """Model: book the last result, -> the next request of this cycle or None."""
+        """Model: book the last result, -> the next request of this cycle, EXCHANGE or None."""
+        self.exchanged = False
         if self.gen is None:
             self.gen = self.model.cycle(int(self.dut.out_hold_i.value), int(self.dut.two_extra_i.value))
             step = lambda: next(self.gen)  # noqa: E731
@@ -200,6 +219,19 @@ class TB:
                     self.compare(range(OUT_IMG, SENT))  # SLOT_STATE: at the end of the cycle
             self.pending_result = data
             self.on_call(len(self.calls))
+
+    async def _exchange(self):
+        """At each exchange_done: the model must be there too, with every word but those of the next snapshot."""
+        dut = self.dut
+        while True:
+            await dut.exchange_count_o.value_change
+            if not self.judged:
+                continue
+            assert not int(dut.req_valid_o.value) and self.pending_result is not None, "exchange_done: a call is open"
+            step = self._advance() if self.gen else "no cycle"
+            assert step == EXCHANGE, f"exchange_done, model expects {step}"
+            self.exchanged = True
+            self.compare([k for k in range(256) if not OUT_SNAP <= k < IN_WORK])
 
     async def _publish(self):
         """At each cycle_done: the model must have reached the same end; every word is compared."""
@@ -326,7 +358,8 @@ async def lost_slave(dut):
         await tb.cycles(1)
         expected = 0 if k == fail - 1 else 0xA
         assert nibble([tb.peek(k) for k in range(256)], IN_IMG, 20) == expected
-        assert tb.peek(STATE + 20) == 0xA | NO_RESPONSE << 4 | PARITY << 8 | retry << 12 | (k + 1) << 16
+        assert tb.peek(STATE + 20) == (0xA | NO_RESPONSE << 4 | PARITY << 8 | retry << 12 | (k + 1) << 16 |
+                                       (k + 3) << 28)
     assert int(dut.lost_count_o.value) == 1
     await tb.cycles(3)
     assert sum(c[2] >> 5 == 20 for c in tb.calls[first:]) == fail
@@ -463,6 +496,175 @@ async def published_together(dut):
     cocotb.start_soon(watch())
     await tb.cycles(6)
     assert len(images) == 7 and int(dut.cycle_count_o.value) == 6
+
+
+@cocotb.test(timeout_time=60, timeout_unit="ms")
+async def live_outputs(dut):
+    """LK-018, LK-006, CA-001, CA-004: OUT_IMG changes in every call: live slots follow it, the others keep the
+    snapshot, also the cycle's first slot, A and B of one number, and under out_hold."""
+    tb = TB(dut)
+    await tb.start()
+    for index, slot in {1: ACTIVE | LIVE, 8: ACTIVE, 9: ACTIVE | LIVE, 20: ACTIVE | EXTENDED | LIVE,
+                        52: ACTIVE | EXTENDED, 63: ACTIVE | EXTENDED | LIVE}.items():
+        tb.poke(index, slot)
+
+    def image(value):
+        for k in range(8):
+            tb.poke(OUT_IMG + k, 0x11111111 * value)
+    # call k of a cycle writes 8 + k: not the first one, next to it the snapshot is taken
+    tb.on_call = lambda count: image(8 + (count - 1) % 5) if (count - 1) % 5 else None
+    image(1)
+    await tb.cycles(2)
+    image(2)
+    dut.out_hold_i.value = 1
+    await tb.cycles(2)
+    assert tb.numbers() == [[1, 8, 9, 20, 31]] * 4
+    nibbles = [c[2] & 15 for c in tb.calls]
+    assert nibbles[0:5] == [1, 1, 9, 8 | 10 & 7, 11 & 7]            # 20: A, I3 = 1; 31B: I3 = 0
+    assert nibbles[5:10] == [12, 12, 9, 12 & 7, 11 & 7]             # 20B is not live
+    assert nibbles[10:15] == [2, 12, 9, 8 | 10 & 7, 11 & 7]         # out_hold: only the live ones are new
+    assert nibbles[15:20] == [12, 12, 9, 12 & 7, 11 & 7]
+
+
+@cocotb.test(timeout_time=60, timeout_unit="ms")
+async def live_moment(dut):
+    """LK-018: the core writes a live nibble at any clock around the end of the call before: what is written by the
+    clock after the result is sent; from then to the offer the core has to wait, and what it writes is for the next
+    call."""
+    tb = TB(dut)
+    await tb.start()
+    tb.judged = False
+    for number in (3, 4, 5):
+        tb.poke(number, ACTIVE | LIVE)
+    dut.cycle_en_i.value = 1
+    outcome = {}  # clock of the write after the result -> sent at once
+    for delay in range(CALL - 8, CALL + 24):
+        value = delay % 15 + 1
+        while not tb.calls or tb.calls[-1][2] >> 5 != 3:
+            await dut.acc_count_o.value_change
+            await FallingEdge(dut.clk_i)
+        calls = len(tb.calls)
+        await ClockCycles(dut.clk_i, delay)
+        dut.core_req_i.value, dut.core_addr_i.value, dut.core_wdata_i.value = 1, OUT_IMG, 0x11111111 * value
+        await FallingEdge(dut.clk_i)
+        while not int(dut.core_ack_o.value):
+            await FallingEdge(dut.clk_i)
+        clock = int(dut.since.value)
+        await RisingEdge(dut.clk_i)
+        dut.core_req_i.value = 0
+        while len(tb.calls) < calls + 2:
+            await dut.acc_count_o.value_change
+            await FallingEdge(dut.clk_i)
+        assert [c[2] >> 5 for c in tb.calls[calls:calls + 2]] == [4, 5]
+        outcome.setdefault(min(clock, 99), set()).add(tb.calls[calls][2] & 15 == value)
+        assert tb.calls[calls + 1][2] & 15 == value
+    assert {c for c, now in outcome.items() if now == {True}} == {1, 99}, outcome        # 99: before the result
+    assert {c for c, now in outcome.items() if now == {False}} >= {9, 14}, outcome
+    assert not set(outcome) & set(range(2, 9)), outcome             # the clocks of the books
+    await tb.idle()
+
+
+@cocotb.test(timeout_time=60, timeout_unit="ms")
+async def exchange_event(dut):
+    """LK-019: exchange_done once a cycle, after the last DEXG is booked, good or failed, and before the extra slots;
+    not in a cycle without a slot. When, and with which words: checked at each event."""
+    tb = TB(dut)
+    await tb.start()
+    count = lambda: int(dut.exchange_count_o.value)  # noqa: E731
+    at = []
+
+    async def watch():
+        while True:
+            await dut.exchange_count_o.value_change
+            at.append((tb.calls[-1][1], tb.calls[-1][2] >> 5, int(dut.since.value)))
+    cocotb.start_soon(watch())
+    tb.poke(INCL_REQ, request(0x410, valid=1))
+    await tb.cycles(2)
+    assert count() == 0 and len(tb.calls) == 2                      # inclusion only
+    tb.poke(6, ACTIVE)
+    tb.poke(30, ACTIVE)
+    fail = set()
+    tb.answer = lambda call: (NO_RESPONSE, NO_RESPONSE, 0, 1) if call >> 5 in fail else (OK, OK, 3, 0)
+    await tb.cycles(2)
+    fail.add(30)                                                    # the last one fails, and is lost
+    await tb.cycles(tb.model.fail_cycles + 2)
+    fail.add(6)                                                     # the only one
+    await tb.cycles(tb.model.fail_cycles)
+    events = count()
+    assert events == 2 * tb.model.fail_cycles + 4
+    await tb.cycles(2)
+    assert count() == events                                        # nobody is left
+    dut.two_extra_i.value = 1
+    tb.poke(STATE + 6, 0)
+    tb.poke(MGMT_REQ, request(0x500, tag=7))
+    await tb.cycles(1)
+    assert [c[1] for c in tb.calls[-3:]] == [DEXG, MGMT, INCL] and count() == events + 1
+    tb.poke(INCL_REQ, 0)
+    await tb.cycles(1)                                              # no extra slot
+    assert count() == events + 2
+    assert {(phase, clock) for phase, _, clock in at} == {(DEXG, 8)}  # 8 clocks after the result
+
+
+@cocotb.test(timeout_time=60, timeout_unit="ms")
+async def sent_and_calls(dut):
+    """LK-020: SLOT_STATE.sent is the information of the last call, repeated ones too, calls counts finished calls
+    modulo 16, failed ones too, A and B apart; results of other calls have neither."""
+    tb = TB(dut)
+    await tb.start()
+    tb.poke(6, ACTIVE | EXTENDED | LIVE)
+    tb.poke(38, ACTIVE | EXTENDED | LIVE)
+    tb.poke(31, ACTIVE)
+    tb.poke(STATE + 31, 0xE << 28)                                  # the sequencer counts on from what is there
+    tb.answer = lambda call: (NO_RESPONSE, PARITY, 0, 1) if call >> 5 == 31 and len(tb.calls) % 2 else (OK, OK, 9, 0)
+    state = lambda index: (tb.peek(STATE + index) >> 20 & 15, tb.peek(STATE + index) >> 28)  # noqa: E731
+    for k in range(1, 37):
+        tb.poke(OUT_IMG, 0x11111111 * (k % 16))
+        tb.poke(OUT_IMG + 3, 0xF0000000 - (k % 16 << 28))
+        tb.poke(OUT_IMG + 4, 0x11111111 * (k // 2 % 16))
+        tb.poke(STATE + 31, tb.model.ram[STATE + 31] & ~0x70000)        # never lost
+        await tb.cycles(1)
+        assert state(31) == (15 - k % 16, (14 + k) % 16)
+        assert state(6 + 32 * (1 - k % 2)) == ((8 | k & 7) if k % 2 else k // 2 & 7, (k + 1) // 2 % 16)
+    tb.poke(MGMT_REQ, request(0x4FF, tag=0xFF))
+    tb.poke(INCL_REQ, request(0x4FF, tag=0xFF, valid=1))
+    dut.two_extra_i.value = 1
+    await tb.cycles(1)
+    assert [tb.peek(k) >> 24 for k in (MGMT_RES, INCL_RES)] == [0, 0]
+    assert [r >> 24 for r in await tb.batch([request(0x4FF, tag=0xFF)])] == [0]
+
+
+@cocotb.test(timeout_time=60, timeout_unit="ms")
+async def read_id(dut):
+    """LK-021, CA-003, CA-004, LK-003, LK-004: with read_id slots are called with RDID (10001, for B slaves 11001), in
+    the same order and turns, with the same repetitions and removal; a change counts from the next offer on."""
+    tb = TB(dut)
+    await tb.start()
+    rdid, rdid_b = 0x411, 0x419
+    tb.poke(2, ACTIVE | LIVE)
+    tb.poke(7, ACTIVE | EXTENDED)
+    tb.poke(39, ACTIVE | EXTENDED | LIVE)
+    tb.poke(44, ACTIVE | EXTENDED)
+    for k in range(8):
+        tb.poke(OUT_IMG + k, 0xEEEEEEEE)
+    dut.read_id_i.value = 1
+    tb.answer = lambda call: (OK, OK, 0xA, 0)
+    await tb.cycles(2)
+    assert [c[2] for c in tb.calls] == [rdid | 2 << 5, rdid | 7 << 5, rdid_b | 12 << 5,
+                                        rdid | 2 << 5, rdid_b | 7 << 5, rdid_b | 12 << 5]
+    assert {c[1:2] + c[3:5] for c in tb.calls} == {(DEXG, tb.model.dexg_retry, 0)}
+    assert tb.peek(STATE + 2) == 0xA | 1 << 20 | 2 << 28 and tb.peek(STATE + 44) == 0xA | 9 << 20 | 2 << 28
+    # removal
+    tb.answer = lambda call: (NO_RESPONSE, NO_RESPONSE, 0, 1) if call >> 5 & 31 == 2 else (OK, OK, 0xA, 0)
+    first = len(tb.calls)
+    await tb.cycles(tb.model.fail_cycles + 2)
+    assert sum(c[2] >> 5 & 31 == 2 for c in tb.calls[first:]) == tb.model.fail_cycles and tb.model.lost == 1
+    # in the middle of a cycle
+    tb.poke(STATE + 2, 0)
+    tb.answer = lambda call: (OK, OK, 0xA, 0)
+    tb.on_call = lambda count: setattr(dut.read_id_i, "value", 0) if tb.calls[-1][2] >> 5 == 7 | 32 else None
+    first = len(tb.calls)
+    await tb.cycles(2)
+    assert [c[2] >> 10 for c in tb.calls[first:]] == [1, 1, 0, 0, 0, 0]
 
 
 @cocotb.test(timeout_time=120, timeout_unit="ms")
@@ -691,13 +893,16 @@ def random_plant(rng, tb):
         tb.poke(number + 32, {"-": 2, "S": 0, "A": 0, "B": 3, "X": 3}[kind])
         for index in (number, number + 32):
             if rng.random() < 0.5:
-                tb.poke(STATE + index, rng.randrange(16))
+                tb.poke(STATE + index, rng.randrange(16) | rng.randrange(16) << 20 | rng.randrange(16) << 28)
+            if rng.random() < 0.4:
+                tb.poke(index, tb.peek(index) | LIVE)
 
 
 @cocotb.test(timeout_time=900, timeout_unit="ms")
 async def random_plants(dut):
-    """LK-001, LK-002, LK-003, LK-004, LK-005, LK-007, LK-008, LK-009, LK-013: hundreds of cycles of random plants,
-    failures, outputs, management and inclusion requests against the model."""
+    """LK-001, LK-002, LK-003, LK-004, LK-005, LK-007, LK-008, LK-009, LK-013, LK-018, LK-019, LK-020, LK-021: hundreds
+    of cycles of random plants, live slots, failures, outputs, management and inclusion requests, DEXG and RDID against
+    the model."""
     tb = TB(dut)
     await tb.start()
     for seed in range(8):
@@ -721,6 +926,8 @@ async def random_plants(dut):
                     tb.poke(INCL_REQ, rng.getrandbits(24) | rng.randrange(2) << 31)
             if count > 2 and tb.calls[-1][1] == tb.calls[-2][1] == DEXG and tb.calls[-1][2] >> 5 > tb.calls[-2][2] >> 5:
                 tb.poke(OUT_IMG + rng.randrange(8), rng.getrandbits(32))  # not in the first call, next to the snapshot
+            if rng.random() < 0.03:
+                dut.read_id_i.value = 1 - int(dut.read_id_i.value)
         tb.answer, tb.on_call = answer, on_call
         for _ in range(3):
             await tb.cycles(12)
@@ -730,14 +937,19 @@ async def random_plants(dut):
                 tb.poke(index, tb.peek(index) ^ 1)
             dut.out_hold_i.value = rng.randrange(2)
     assert tb.published == 288 and tb.model.lost > 20 and len(tb.calls) > 1500
+    assert int(dut.exchange_count_o.value) > 200 and sum(c[2] >> 10 and c[1] == DEXG for c in tb.calls) > 200
     assert int(dut.offer_max_o.value) <= OFFER_MAX
     dut._log.info("%d cycles, %d calls, %d words compared", tb.published, len(tb.calls), tb.checked)
 
 
+KEPT = 0xF0F7000F  # of SLOT_STATE, what an aborted call leaves alone: data, streak, sent, calls
+
+
 @cocotb.test(timeout_time=400, timeout_unit="ms")
 async def stop_in_a_cycle(dut):
-    """LK-013, LK-004, LT-011: enable_i drops at every clock around and inside a cycle: it ends without publication,
-    streaks stay, nothing new is offered; afterwards cycles go on as before."""
+    """LK-013, LK-004, LK-019, LK-020, LT-011: enable_i drops at every clock around and inside a cycle: it ends without
+    publication, after an abort without exchange_done; streaks stay, an aborted call is not counted, nothing new is
+    offered; afterwards cycles go on as before."""
     tb = TB(dut)
     tb.strict = False
     await tb.start()
@@ -755,6 +967,7 @@ async def stop_in_a_cycle(dut):
         tb.poke(STATE + 20, tb.model.ram[STATE + 20] & 0xFFFF)  # never lost here
         dut.two_extra_i.value = offset & 1
         before, calls = int(dut.cycle_count_o.value), len(tb.calls)
+        exchanges = int(dut.exchange_count_o.value)
         dut.cycle_en_i.value = 1
         await ClockCycles(dut.clk_i, 1 + offset)
         await FallingEdge(dut.clk_i)
@@ -772,21 +985,22 @@ async def stop_in_a_cycle(dut):
         if tb.gen is not None:  # the open cycle: an accepted call came back, or one that was only offered was withdrawn
             expected, ram = None, tb.model.ram
             saved = ram[CYCLES], ram[IN_IMG:MGMT_REQ], tb.model.odd
-            if tb.pending_result is not None:
+            if tb.pending_result is not None or tb.exchanged:
                 expected = tb._advance()
             ram[CYCLES], ram[IN_IMG:MGMT_REQ], tb.model.odd = saved  # stopped after the last call: not published
             for word in (STATE + 1, STATE + 33, STATE + 20, MGMT_RES, INCL_RES):
                 if tb.peek(word) != tb.model.ram[word]:
                     assert expected and tb.peek(word) >> 4 & 0x3FF == ABORTED << 4 | ABORTED, f"word {word:#x}"
                     if word < BATCH:
-                        assert (tb.peek(word) ^ tb.model.ram[word]) & 0x7000F == 0, "streak or data changed"
+                        assert (tb.peek(word) ^ tb.model.ram[word]) & KEPT == 0, "streak, data, sent or calls changed"
                     tb.model.ram[word] = tb.peek(word)
                     kinds.add("withdrawn")
             tb.gen = None
             kinds.add("open")
+            kinds.add("exchanged" if int(dut.exchange_count_o.value) > exchanges else "not exchanged")
         elif tb.peek(STATE + 1) != tb.model.ram[STATE + 1] or tb.peek(STATE + 33) != tb.model.ram[STATE + 33]:
             for word in (STATE + 1, STATE + 33):   # the first request of a cycle was withdrawn
-                assert (tb.peek(word) ^ tb.model.ram[word]) & 0x7000F == 0
+                assert (tb.peek(word) ^ tb.model.ram[word]) & KEPT == 0
                 tb.model.ram[word] = tb.peek(word)
             kinds.add("first")
         tb.model.was_mgmt = bool(dut.u_dut.was_mgmt_q.value)
@@ -797,7 +1011,7 @@ async def stop_in_a_cycle(dut):
         dut.cycle_en_i.value = 0
         dut.enable_i.value = 1
         await ClockCycles(dut.clk_i, GAP)
-    assert kinds >= {"open", "withdrawn", "first", "done0", "done1"}, kinds
+    assert kinds >= {"open", "withdrawn", "first", "done0", "done1", "exchanged", "not exchanged"}, kinds
     await tb.cycles(4)
 
 

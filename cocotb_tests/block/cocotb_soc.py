@@ -15,7 +15,8 @@ STATS, STATS_CLEAR, RING = 0x8002_0000, 0x8002_1000, 0x8003_0000
 MAIL = 0x3F00 // 4                                                 # mailbox of soc_probe.c, word in the host window
 OP, ADDR, DATA, RESULT, IRQS, EVENTS, ALIVE = range(MAIL, MAIL + 7)
 READ, WRITE, CALL, IRQ_ON, IRQ_OFF = {1: 1, 2: 2, 4: 3}, {1: 4, 2: 5, 4: 6}, 7, 8, 9
-EVENT_BIT = {"cycle_done": 0, "batch_done": 1, "slave_lost": 2, "apf_change": 3, "tick": 4, "host_attn": 5}
+EVENT_BIT = {"cycle_done": 0, "batch_done": 1, "slave_lost": 2, "apf_change": 3, "tick": 4, "host_attn": 5,
+             "efault_change": 6, "exchange_done": 7}
 
 
 def reg(name):
@@ -27,7 +28,7 @@ class TB:
 
     PERIOD_NS = 10
     INPUTS = ("seq_req_i", "seq_we_i", "seq_addr_i", "seq_wdata_i", "batch_busy_i", "cycle_busy_i", "apf_i", "efault_i",
-              "cycle_done_i", "batch_done_i", "slave_lost_i", "spi_miso_i")
+              "cycle_done_i", "exchange_done_i", "batch_done_i", "slave_lost_i", "spi_miso_i")
 
     def __init__(self, dut):
         self.dut, self.clk = dut, dut.clk_i
@@ -167,15 +168,15 @@ async def new_code_is_fetched(dut):
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
 async def registers(dut):
-    """LK-010, LK-014, EX-011: registers drive the sequencer and show its state; a BATCH write is one start pulse."""
+    """LK-010, LK-014, LK-021, EX-011: registers drive the sequencer and show its state; a BATCH write is one start pulse."""
     tb = TB(dut)
     await tb.start()
     assert await tb.peek(reg("ID")) == 0x4153_0001
-    pins = ("cycle_en", "two_extra", "out_hold", "line_en")
-    for bits in (1, 2, 4, 8, 15, 0):
-        await tb.poke(reg("CTRL"), bits | (bits * 321) << 16)
-        assert [int(getattr(dut, f"{p}_o").value) for p in pins] == [bits >> k & 1 for k in range(4)]
-        assert int(dut.min_cycle_us_o.value) == bits * 321
+    pins = ("cycle_en", "two_extra", "out_hold", "line_en", "read_id")
+    for bits in (1, 2, 4, 8, 16, 31, 0):
+        await tb.poke(reg("CTRL"), bits | (bits * 259) << 16)
+        assert [int(getattr(dut, f"{p}_o").value) for p in pins] == [bits >> k & 1 for k in range(5)]
+        assert int(dut.min_cycle_us_o.value) == bits * 259
     for phase in range(6):
         await tb.poke(reg("EXEC"), phase)
         assert int(dut.exec_phase_o.value) == phase
@@ -198,14 +199,15 @@ async def registers(dut):
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
 async def events(dut):
-    """LK-007, HW-002, EX-021: events are sticky, cleared one by one, and not lost in the clock of a clearing write."""
+    """LK-007, LK-019, LT-016, HW-002, EX-021: events are sticky, cleared one by one, and not lost in the clock of a clearing write."""
     tb = TB(dut)
     await tb.start()
-    await tb.poke(reg("EVENT"), 0x3F)
+    await tb.poke(reg("EVENT"), 0xFF)
 
     async def raise_(name):
-        if name == "apf_change":
-            dut.apf_i.value = 1 - int(dut.apf_i.value)
+        if name in ("apf_change", "efault_change"):
+            pin = dut.apf_i if name == "apf_change" else dut.efault_i
+            pin.value = 1 - int(pin.value)
             await RisingEdge(tb.clk)
         elif name == "host_attn":
             await tb.host_write(regmap.HOST_HOST_SEQ // 4, 1)
@@ -216,14 +218,14 @@ async def events(dut):
         await raise_(name)
         bit = 1 << EVENT_BIT[name]
         assert await tb.peek(reg("EVENT")) & ~16 == bit, name
-        await tb.poke(reg("EVENT"), 0x2F ^ bit)
+        await tb.poke(reg("EVENT"), 0xEF ^ bit)
         assert await tb.peek(reg("EVENT")) & ~16 == bit, f"{name} cleared by another bit"
         await tb.poke(reg("EVENT"), bit)
         assert await tb.peek(reg("EVENT")) & ~16 == 0, name
     await raise_("apf_change")                                     # power back: an event again
     assert await tb.peek(reg("EVENT")) & ~16 == 8
-    for name in ("cycle_done", "batch_done", "slave_lost"):        # exactly in the clock of the clearing write
-        await tb.begin(WRITE[4], reg("EVENT"), 0x3F)
+    for name in ("cycle_done", "batch_done", "slave_lost", "exchange_done"):  # exactly in the clock of the clearing write
+        await tb.begin(WRITE[4], reg("EVENT"), 0xFF)
         while not (int(dut.regs_req.value) and int(dut.dwe.value)):
             await FallingEdge(tb.clk)
         await tb.pulse(name)
@@ -287,7 +289,8 @@ async def wait_sleeps(dut):
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
 async def interrupt(dut):
-    """LK-007: an enabled event interrupts the core once; a masked one does not; WAIT and interrupt go together."""
+    """LK-007, LK-019: an enabled event interrupts the core once, a masked one when it is enabled; WAIT and interrupt go
+    together."""
     tb = TB(dut)
     await tb.start()
     await tb.poke(reg("EVENT_EN"), 1)
@@ -298,18 +301,25 @@ async def interrupt(dut):
         await ClockCycles(tb.clk, 300)
         assert await tb.host_read(IRQS) == n
     assert await tb.host_read(EVENTS) & ~16 == 1
-    await tb.pulse("batch_done")
+    await tb.pulse("exchange_done")                                # not enabled yet
     await ClockCycles(tb.clk, 300)
     assert await tb.host_read(IRQS) == 3
+    await tb.poke(reg("EVENT_EN"), 0x81)
+    await ClockCycles(tb.clk, 300)
+    assert await tb.host_read(IRQS) == 4
+    assert await tb.host_read(EVENTS) & ~16 == 0x81
+    await tb.pulse("batch_done")
+    await ClockCycles(tb.clk, 300)
+    assert await tb.host_read(IRQS) == 4
     await tb.begin(READ[4], reg("WAIT"))                           # asleep; the event ends the read and interrupts
     await tb.until(dut.core_wait_o)
     await tb.pulse("cycle_done")
     await tb.finish()
-    assert await tb.host_read(IRQS) == 4
+    assert await tb.host_read(IRQS) == 5
     await tb.do(IRQ_OFF)
     await tb.pulse("cycle_done")
     await ClockCycles(tb.clk, 300)
-    assert await tb.host_read(IRQS) == 4 and await tb.peek(reg("EVENT")) & 1 == 1
+    assert await tb.host_read(IRQS) == 5 and await tb.peek(reg("EVENT")) & 1 == 1
 
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")

@@ -21,7 +21,7 @@ def covered(data):
 
 
 def test_rules():
-    """LK-001, LK-002, LK-004, LK-008..LK-010, LK-013..LK-017: the rules of the proof hold in simulation from reset, and
+    """LK-001, LK-002, LK-004, LK-008..LK-010, LK-013..LK-021: the rules of the proof hold in simulation from reset, and
     each of its covers is reached, so none of them holds for want of traffic."""
     run_cocotb("asi_seq_rules_tb", ["link/asi_seq.sv", HARNESS, TB], "cocotb_tests.block.cocotb_seq_rules",
                extra_args=["--coverage-user", "-DFV_SIM", "-Wno-lint", "-Wno-style"],

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // asi_seq: runs whole AS-i cycles and batches from the link RAM, without firmware between two telegrams.
-// Contract: docs/architecture.md ("asi_seq"); words: rdl/asi.rdl; requirements LK-001 .. LK-014.
+// Contract: docs/architecture.md ("asi_seq"); words: rdl/asi.rdl; requirements LK-001 .. LK-021.
 //
 // One call:  offer -> (while it is on the line: search the next slot) -> result -> books -> next offer.
 // The search therefore never stretches a gap: from the result to the next offer it takes a constant number of clocks
 // per kind of step (at most MaxOfferClocks), whatever slots are active. It knows only the slots as they were when the
 // present call was offered: a slot that firmware switches on or off counts at the latest one call of its own later.
 // A number's A and B index take turns among those that are callable: active and streak < FailCycles.
+// A DEXG's output nibble is fetched in the clock before its offer. Between the clock in which a result is taken up and
+// this fetch the memory port is never free, so a live slot is called with what the core has written by that clock.
 module asi_seq
   import asi_map_pkg::*;
 #(
@@ -34,6 +36,7 @@ module asi_seq
   input  logic        enable_i,           // 0: no new call; the open one comes back as ABORTED
   input  logic        cycle_en_i,         // 1: cycles back to back; 0: stop after the present one
   input  logic        two_extra_i, out_hold_i,
+  input  logic        read_id_i,          // slots are called with RDID instead of DEXG; taken at each offer
   input  logic [12:0] min_cycle_us_i,
   input  logic        tick_us_i,          // pulse each microsecond
   input  logic        batch_start_i,      // pulse; ignored while something runs
@@ -41,6 +44,7 @@ module asi_seq
   // status
   output logic        batch_busy_o, cycle_busy_o,
   output logic        batch_done_o, cycle_done_o, slave_lost_o,  // pulses
+  output logic        exchange_done_o,    // pulse: the cycle's last DEXG is booked, the extra slots follow
   output logic [2:0]  slot_phase_o,       // phase_e while a cycle runs, right from before the request's first edge
   output logic        sync_o              // one clock, with the first sent_i of a cycle
 );
@@ -66,7 +70,8 @@ module asi_seq
   logic [5:0]  nxt_d, nxt_q;                // index of the next DEXG; batch: number of requests (0 = 64)
   logic        nxt_v_d, nxt_v_q;            // there is a next DEXG ...
   logic        wrap_d, wrap_q;              // ... and it belongs to the next cycle
-  logic        a_d, a_q, b_d, b_q, ext_d, ext_q, ext_b_d, ext_b_q;  // search: callable, extended
+  logic        a_d, a_q, b_d, b_q;          // search: callable
+  logic [1:0]  opt_d, opt_q, opt_b_d, opt_b_q;  // search: {live, extended} of A, of B; then of the next DEXG
   logic [3:0]  cnt_d, cnt_q;                // step of the search; of a copy: {word, write}
   logic        snap_d, snap_q;              // this cycle's output snapshot is still to be taken
   logic        odd_d, odd_q;                // odd cycle: B's turn
@@ -76,7 +81,7 @@ module asi_seq
   logic [10:0] call_d, call_q;
   logic        no_reply_d, no_reply_q, sel_d, sel_q;
   logic [1:0]  retries_d, retries_q;
-  logic [7:0]  tag_d, tag_q;
+  logic [7:0]  tag_d, tag_q;                // DEXG: {I3..I0 as sent, 0}
   logic        pend_d, pend_q;              // a management request is pending
   logic        was_mgmt_d, was_mgmt_q;      // the last extra slot was a management slot
   logic        lost_d, lost_q;
@@ -102,17 +107,19 @@ module asi_seq
   assign gone       = streak >= 3'(FailCycles);
 
   // ------------------------------------------------------------------------------------------ write data
-  // read word + inc (copy: 0, counters: 1), nibbles replaced where a result is written
-  logic        inc;
+  // read word + inc (copy: 0, counters: 1), nibbles replaced where a result is written. SLOT_STATE.calls counts in the
+  // same adder, and stands alone there: nothing is carried into it.
+  logic        inc, inc_calls;
   logic [7:0]  put;  // nibbles to replace
   logic [31:0] sum;
   logic [23:0] book; // SLOT_STATE or a result word
-  assign sum  = mem_rdata_i + 32'(inc);
+  assign sum  = mem_rdata_i + {3'd0, inc_calls, 27'd0, inc};
   assign book = {tag_q[7:4], !is_dexg ? tag_q[3:0] : ok ? 4'd0 : {1'b0, aborted ? streak : streak_inc},
                  2'b00, repeats_q, rfirst_q, last_q, answer};
   always_comb begin
     put = '0;
-    if (state_q == StResWr) put = {7'h7F, !is_dexg || ok};  // a failing slave keeps its last valid answer
+    // a failing slave keeps its last valid answer; an aborted call counts for nothing
+    if (state_q == StResWr) put = {!is_dexg, 1'b1, !is_dexg || !aborted, 4'hF, !is_dexg || ok};
     if (state_q == StInWr)  put[cur_q[2:0]] = ok || lost_q;
     for (int k = 0; k < 8; k++) begin
       mem_wdata_o[4*k +: 4] = sum[4*k +: 4];
@@ -122,15 +129,18 @@ module asi_seq
 
   // ------------------------------------------------------------------------------------------ sequence
   logic       do_mgmt, do_incl, sel, load, load_dexg, offer;
-  logic [3:0] nibble;
+  logic [3:0] nibble, info;  // output of the next slot; I3..I0 of its call
+  logic       ext, live;     // options of the next slot
+  assign {live, ext} = opt_q;
   assign nibble  = mem_rdata_i[4*nxt_q[2:0] +: 4];
+  assign info    = read_id_i ? {nxt_q[5], 3'b001} : {ext ? !nxt_q[5] : nibble[3], nibble[2:0]};
   assign do_mgmt = pend_q && !(was_mgmt_q && mem_rdata_i[RequestValidLsb] && !two_extra_i);
   assign do_incl = !do_mgmt && mem_rdata_i[RequestValidLsb];
   assign sel     = b_q && !gone && (!a_q || (odd_q ^ wrap_q));  // last step of the search: rdata is B's state
 
   always_comb begin
     state_d = state_q;  kind_d = kind_q;  cur_d = cur_q;  nxt_d = nxt_q;  nxt_v_d = nxt_v_q;  wrap_d = wrap_q;
-    a_d = a_q;  b_d = b_q;  ext_d = ext_q;  ext_b_d = ext_b_q;  cnt_d = cnt_q;  snap_d = snap_q;  odd_d = odd_q;
+    a_d = a_q;  b_d = b_q;  opt_d = opt_q;  opt_b_d = opt_b_q;  cnt_d = cnt_q;  snap_d = snap_q;  odd_d = odd_q;
     first_d = first_q && !sent_i;  open_d = open_q;  valid_d = valid_q && !(req_ready_i && enable_i);
     pend_d = pend_q;  was_mgmt_d = was_mgmt_q;  lost_d = lost_q;
     sent_d = sent_q || sent_i;  again_d = again_q || (sent_i && repeat_i);
@@ -140,8 +150,8 @@ module asi_seq
     us_d    = sync_o ? '0 : us_q + 13'(tick_us_i);
     paced_d = !sync_o && (paced_q || (tick_us_i && us_q >= min_cycle_us_i && (!first_q || us_q >= 13'(EmptyUs))));
     mem_req_o = 1'b0;  mem_we_o = 1'b0;  mem_addr_o = {AddrCount, CountSent};
-    inc = 1'b0;  load = 1'b0;  load_dexg = 1'b0;  offer = 1'b0;
-    batch_done_o = 1'b0;  cycle_done_o = 1'b0;  slave_lost_o = 1'b0;
+    inc = 1'b0;  inc_calls = 1'b0;  load = 1'b0;  load_dexg = 1'b0;  offer = 1'b0;
+    batch_done_o = 1'b0;  cycle_done_o = 1'b0;  slave_lost_o = 1'b0;  exchange_done_o = 1'b0;
 
     unique case (state_q)
       // StIdle: nothing runs
@@ -173,14 +183,14 @@ module asi_seq
             nxt_d = 6'd1;  wrap_d = 1'b1;  cnt_d = '0;
             if (wrap_q) begin nxt_v_d = 1'b0; state_d = open_q ? StWait : StPace; end
           end
-          3'd1: {ext_d, a_d} = {mem_rdata_i[SlotExtendedLsb], mem_rdata_i[SlotActiveLsb]};
+          3'd1: {opt_d, a_d} = {mem_rdata_i[SlotLiveLsb], mem_rdata_i[SlotExtendedLsb], mem_rdata_i[SlotActiveLsb]};
           3'd2: a_d = a_q && !gone;
-          3'd3: {ext_b_d, b_d} = {mem_rdata_i[SlotExtendedLsb], mem_rdata_i[SlotActiveLsb]};
+          3'd3: {opt_b_d, b_d} = {mem_rdata_i[SlotLiveLsb], mem_rdata_i[SlotExtendedLsb], mem_rdata_i[SlotActiveLsb]};
           default: begin
             mem_req_o = 1'b0;
             cnt_d     = '0;
             if (a_q || (b_q && !gone)) begin
-              nxt_d[5] = sel;  nxt_v_d = 1'b1;  ext_d = sel ? ext_b_q : ext_q;
+              nxt_d[5] = sel;  nxt_v_d = 1'b1;  opt_d = sel ? opt_b_q : opt_q;
               state_d  = open_q ? StWait : StPace;
             end else nxt_d[4:0] = nxt_q[4:0] + 5'd1;
           end
@@ -209,7 +219,7 @@ module asi_seq
       // ---- books of one result: SLOT_STATE or the result word, IN_WORK, FAILED
       StStateRd: begin mem_req_o = 1'b1; mem_addr_o = {AddrState, cur_q}; state_d = StResWr; end
       StResWr: begin
-        mem_req_o = 1'b1;  mem_we_o = 1'b1;
+        mem_req_o = 1'b1;  mem_we_o = 1'b1;  inc_calls = !aborted;
         unique case (kind_q)
           KindDexg:  mem_addr_o = {AddrState, cur_q};
           KindBatch: mem_addr_o = {AddrBatch, cur_q};
@@ -235,15 +245,18 @@ module asi_seq
         end
         else if (aborted || !enable_i)              state_d = StIdle;  // the cycle ends without publication
         else if (is_dexg && nxt_v_q && !wrap_q)     state_d = StFetch;
-        else if (is_dexg)                           state_d = StMgmtReq;
+        else if (is_dexg)                           begin exchange_done_o = 1'b1; state_d = StMgmtReq; end
         else if (kind_q == KindMgmt && two_extra_i) state_d = StIncl;
         else                                        state_d = StCopy;
       end
 
       // ---- next DEXG
-      // StFetch: output nibble. The first one comes from OUT_IMG itself; the snapshot follows without a free clock for
-      // the core, so both are of the same moment, and the request is offered 15 clocks earlier.
-      StFetch: begin mem_req_o = 1'b1; mem_addr_o = {AddrImages, 1'b0, !snap_q, nxt_q[5:3]}; state_d = StLoad; end
+      // StFetch: output nibble, of a live slot from OUT_IMG. A cycle's first one comes from OUT_IMG as well; the
+      // snapshot follows without a free clock for the core, so both are of one moment; the offer is 15 clocks earlier.
+      StFetch: begin
+        mem_req_o = 1'b1;  mem_addr_o = {AddrImages, 1'b0, !(snap_q || live), nxt_q[5:3]};
+        state_d = StLoad;
+      end
       StLoad: begin
         state_d = StMgmtReq;
         if (nxt_v_q) begin
@@ -317,11 +330,11 @@ module asi_seq
       tag_d      = mem_rdata_i[RequestTagLsb +: RequestTagW];
     end
     if (load_dexg) begin
-      call_d     = {1'b0, nxt_q[4:0], 1'b0, ext_q ? !nxt_q[5] : nibble[3], nibble[2:0]};
+      call_d     = {read_id_i, nxt_q[4:0], read_id_i, info};
       sel_d      = nxt_q[5];
       no_reply_d = 1'b0;
       retries_d  = 2'(DexgRetry);
-      tag_d      = '0;
+      tag_d      = {info, 4'd0};
     end
     if (offer) begin valid_d = 1'b1; open_d = 1'b1; end
   end
@@ -350,7 +363,7 @@ module asi_seq
     was_mgmt_q <= rst_i ? 1'b0 : was_mgmt_d;
     // no reset needed: StIdle or the step that uses them sets these
     {kind_q, cur_q, nxt_q, nxt_v_q, wrap_q, cnt_q} <= {kind_d, cur_d, nxt_d, nxt_v_d, wrap_d, cnt_d};
-    {a_q, b_q, ext_q, ext_b_q, pend_q, lost_q} <= {a_d, b_d, ext_d, ext_b_d, pend_d, lost_d};
+    {a_q, b_q, opt_q, opt_b_q, pend_q, lost_q} <= {a_d, b_d, opt_d, opt_b_d, pend_d, lost_d};
     {call_q, sel_q, no_reply_q, retries_q, tag_q} <= {call_d, sel_d, no_reply_d, retries_d, tag_d};
     {last_q, rfirst_q, data_q, repeats_q} <= {last_d, rfirst_d, data_d, repeats_d};
     {us_q, paced_q} <= {us_d, paced_d};

@@ -32,13 +32,13 @@ module asi_soc #(
   input  logic [31:0] seq_wdata_i,
   output logic [31:0] seq_rdata_o,
   output logic        tick_us_o,                      // pulse each microsecond
-  output logic        line_en_o, cycle_en_o, two_extra_o, out_hold_o,
+  output logic        line_en_o, cycle_en_o, two_extra_o, out_hold_o, read_id_o,
   output logic [12:0] min_cycle_us_o,
   output logic        batch_start_o,                  // pulse, batch_len_o is valid with it
   output logic [6:0]  batch_len_o,
   output logic [2:0]  exec_phase_o,
   input  logic        batch_busy_i, cycle_busy_i, apf_i, efault_i,
-  input  logic        cycle_done_i, batch_done_i, slave_lost_i, jabber_i,  // pulses
+  input  logic        cycle_done_i, exchange_done_i, batch_done_i, slave_lost_i, jabber_i,  // pulses
   // monitor
   output logic        mon_enable_o, mon_clear_o,      // clear: pulse
   output logic [7:0]  mon_tail_o,
@@ -157,8 +157,9 @@ module asi_soc #(
   // registered: what the core reads in WAIT does not hang on its own request in the same clock
   always_ff @(posedge clk_i)
     pending <= {8{~rst_i}} & hw_out.EVENT_EN.mask.value &
-                       {hw_out.EVENT.exchange_done.value, hw_out.EVENT.efault_change.value, hw_out.EVENT.host_attn.value, hw_out.EVENT.tick.value, hw_out.EVENT.apf_change.value,
-                        hw_out.EVENT.slave_lost.value, hw_out.EVENT.batch_done.value, hw_out.EVENT.cycle_done.value};
+               {hw_out.EVENT.exchange_done.value, hw_out.EVENT.efault_change.value, hw_out.EVENT.host_attn.value,
+                hw_out.EVENT.tick.value, hw_out.EVENT.apf_change.value, hw_out.EVENT.slave_lost.value,
+                hw_out.EVENT.batch_done.value, hw_out.EVENT.cycle_done.value};
 
   always_comb begin
     hw_in.STATUS.batch_busy.next    = batch_busy_i;
@@ -172,7 +173,7 @@ module asi_soc #(
     hw_in.EVENT.tick.hwset          = tick_us_o & (&time_q[9:0]);
     hw_in.EVENT.host_attn.hwset     = host_attn;
     hw_in.EVENT.efault_change.hwset = efault_i ^ efault_q;
-    hw_in.EVENT.exchange_done.hwset = 1'b0;
+    hw_in.EVENT.exchange_done.hwset = exchange_done_i;
     hw_in.LATCH.apf.hwset           = apf_i;
     hw_in.LATCH.efault.hwset        = efault_i;
     hw_in.LATCH.jabber.hwset        = jabber_i;
@@ -201,6 +202,7 @@ module asi_soc #(
   assign cycle_en_o     = hw_out.CTRL.cycle_en.value;
   assign two_extra_o    = hw_out.CTRL.two_extra.value;
   assign out_hold_o     = hw_out.CTRL.out_hold.value;
+  assign read_id_o      = hw_out.CTRL.read_id.value;
   assign line_en_o      = hw_out.CTRL.line_en.value;
   assign min_cycle_us_o = hw_out.CTRL.min_cycle_us.value;
   assign exec_phase_o   = hw_out.EXEC.phase.value;
