@@ -26,6 +26,7 @@ using WaveFile = VerilatedVcdC;
 
 #include "Vasi_master.h"
 #include "Vasi_master___024root.h"
+#include "asi_flash.h"
 #include "asi_slaves.h"
 
 #ifndef ASI_CLK_HZ
@@ -72,6 +73,7 @@ struct asi_chip {
     void step();
     void run_until(uint64_t clock, bool stop_on_irq);
     uint32_t host(bool write, uint32_t byte_addr, uint32_t data, uint8_t byte_enable);
+    void attach(asi_flash *flash);
     void schedule();
     void get_stats(asi_chip_stats &out);
 
@@ -83,16 +85,20 @@ struct asi_chip {
 
 private:
     struct Watched {  // outputs that make something happen when they change
-        uint8_t man = 1, en = 0, phase = 0, sync = 0, wait = 0;
+        uint8_t man = 1, en = 0, phase = 0, sync = 0, wait = 0, cs_n = 1, sck = 0;
         bool operator==(const Watched &) const = default;
     };
-    Watched sample() const { return {top->tx_man_o, top->tx_en_o, top->phase_o, top->sync_o, top->core_wait_o}; }
+    Watched sample() const {
+        return {top->tx_man_o, top->tx_en_o, top->phase_o, top->sync_o, top->core_wait_o, top->spi_cs_no, top->spi_sck_o};
+    }
     void outputs_changed(const Watched &next);
+    void spi_changed(const Watched &next);
     void event();
     void raise(int32_t polarity, uint64_t until);
     void dump(bool high);
 
     Watched seen_;
+    asi_flash *flash_ = nullptr;
     uint64_t next_event_ = kNoClock;
     uint64_t p_until_ = kNoClock, n_until_ = kNoClock;  // clock at which the comparator output falls
     uint64_t phase_since_ = 0, phase_clocks_[8] = {};
@@ -187,7 +193,27 @@ void asi_chip::event() {
     schedule();
 }
 
+void asi_chip::spi_changed(const Watched &next) {
+    seen_.cs_n = next.cs_n, seen_.sck = next.sck;
+    if (!flash_) return;
+    const uint8_t miso = static_cast<uint8_t>(flash_->pins(time_of(clock), next.cs_n, next.sck, top->spi_mosi_o));
+    inputs_changed |= miso != top->spi_miso_i;
+    top->spi_miso_i = miso;
+}
+
+void asi_chip::attach(asi_flash *flash) {
+    Verilated::threadContextp(&context);
+    flash_ = flash;
+    top->spi_miso_i = 1;
+    inputs_changed = true;
+    if (!flash) return;
+    flash->power_up();
+    if (!seen_.cs_n) spi_changed(seen_);  // the chip is in the middle of a frame
+}
+
 void asi_chip::outputs_changed(const Watched &next) {
+    if (next.cs_n != seen_.cs_n || next.sck != seen_.sck) spi_changed(next);
+    if (next == seen_) return;
     const int64_t t = time_of(clock);
     if (next.man != seen_.man && (next.en || seen_.en)) {
         const int32_t polarity = next.man ? 1 : -1;
@@ -331,6 +357,7 @@ void asi_chip_efault(asi_chip *chip, uint8_t fault) {
     chip->top->efault_i = fault != 0;
     chip->inputs_changed = true;
 }
+void asi_chip_attach_flash(asi_chip *chip, asi_flash *flash) { chip->attach(flash); }
 int asi_chip_log(asi_chip *chip, asi_telegram *out, int max) { return asi_net_log(&chip->net, out, max); }
 void asi_chip_get_stats(asi_chip *chip, asi_chip_stats *out) { chip->get_stats(*out); }
 

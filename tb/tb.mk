@@ -8,7 +8,7 @@ TB_OUT     := $(BUILD)/tb
 TB_CXX     ?= $(CXX)
 TB_FLAGS   := -std=c++20 -O3 -fPIC -Wall -Wextra -Werror
 TB_HEADERS := $(wildcard tb/*.h) tb/tb.mk
-TB_SLAVES  := tb/asi_slaves.cpp tb/asi_monitor.cpp
+TB_SLAVES  := tb/asi_slaves.cpp tb/asi_monitor.cpp tb/asi_flash.cpp
 ASI_CLK_HZ ?= 16000000
 
 $(TB_OUT)/libasi_slaves.so: $(TB_SLAVES) $(TB_HEADERS)

@@ -192,6 +192,76 @@ class Net:
                 for name in ("starts", "ends")}
 
 
+class Flash:
+    """SPI NOR flash model (asi_flash of tb/asi_tb.h), erased. size: bytes, a power of 2. Its content outlives the chips
+    that it is attached to."""
+
+    def __init__(self, size=1 << 21):
+        self._ffi, self._lib = load("asi_slaves")
+        flash = self._lib.asi_flash_new(size)
+        if flash == self._ffi.NULL:
+            raise NativeError(f"flash: {size} is not a power of 2 between 64 KB and 16 MB")
+        self._flash, self.size = self._ffi.gc(flash, self._lib.asi_flash_free), size
+
+    def load(self, address, data):
+        """Put bytes there, whatever was there."""
+        _check(self._lib.asi_flash_load(self._flash, address, bytes(data), len(data)), f"load at {address:#x}")
+
+    def peek(self, address, count):
+        """-> bytes; doubtful cells as they tend."""
+        out = self._ffi.new("uint8_t[]", count)
+        _check(self._lib.asi_flash_peek(self._flash, address, out, count), f"read at {address:#x}")
+        return bytes(out)
+
+    def doubt(self, address, count):
+        """-> bytes whose set bits mark cells that read as 0 or 1, each time anew."""
+        out = self._ffi.new("uint8_t[]", count)
+        _check(self._lib.asi_flash_doubt(self._flash, address, out, count), f"read at {address:#x}")
+        return bytes(out)
+
+    def times(self, program_ns, erase_ns):
+        """How long a page program and a sector erase take; 0.4 ms and 45 ms if never called."""
+        self._lib.asi_flash_times(self._flash, program_ns, erase_ns)
+
+    def cut_after(self, count, seed=1):
+        """Power fails after so many more bytes on SPI; -1: never. seed: of what a broken off operation leaves."""
+        self._lib.asi_flash_cut_after(self._flash, count, seed)
+
+    @property
+    def dead(self):
+        """Power has failed."""
+        return bool(self._lib.asi_flash_is_dead(self._flash))
+
+    def power_up(self):
+        """Off and on again; its time starts at 0. Attaching does the same."""
+        self._lib.asi_flash_power_up(self._flash)
+
+    def worn(self, address, kind):
+        """A sector: 1 erases leave a bit 0, 2 the first byte of a page does not take zeros, 0 good again."""
+        _check(self._lib.asi_flash_worn(self._flash, address, kind), f"worn({address:#x}, {kind})")
+
+    def counts(self):
+        """-> (bytes on SPI, programs, erases, refused frames) since it was made."""
+        c = self._ffi.new("asi_flash_counts *")
+        self._lib.asi_flash_get_counts(self._flash, c)
+        return c.bytes, c.programs, c.erases, c.refused
+
+    def erases(self, address):
+        """-> erases of the sector there."""
+        return self._lib.asi_flash_erases(self._flash, address)
+
+    def select(self, t_ns, on):
+        self._lib.asi_flash_select(self._flash, t_ns, on)
+
+    def byte(self, t_ns, out):
+        """Shift one byte. -> the byte that came back"""
+        return self._lib.asi_flash_byte(self._flash, t_ns, out)
+
+    def pins(self, t_ns, cs_n, sck, mosi):
+        """New levels of the pins. -> MISO"""
+        return self._lib.asi_flash_pins(self._flash, t_ns, cs_n, sck, mosi)
+
+
 class Chip:
     """Verilated asi_master with a Net on its pins.
 
@@ -255,6 +325,11 @@ class Chip:
     def efault(self, fault):
         """Pin efault_i: True = the front end sees an earth fault."""
         self._lib.asi_chip_efault(self._chip, fault)
+
+    def attach_flash(self, flash):
+        """Flash (or None) on the SPI pins; it is powered up. Its content stays when the chip goes."""
+        self._lib.asi_chip_attach_flash(self._chip, flash._flash if flash else self._ffi.NULL)
+        self._flash = flash  # keeps it alive
 
     def log(self):
         """-> [Telegram], drained."""
