@@ -264,7 +264,8 @@ static void receive(asi_ctt_t *c, unsigned index, unsigned answer)
     s->quiet = 0u;
     if (clock != TAKEN_AT || s->step != RECEIVE)
         return;
-    s->rx = (uint8_t)(ASI_CTT2_MSB_FIRST ? s->rx << 1 | data : s->rx >> 1 | data << 7);
+    const unsigned rx = s->rx;
+    s->rx = (uint8_t)(ASI_CTT2_MSB_FIRST ? rx << 1 | data : rx >> 1 | data << 7);
     if (++s->rx_bits == 8u) {
         s->rx_bits = 0u;
         byte(c, index);

@@ -67,7 +67,7 @@ unsigned asi_ctt3_call_8io(asi_ctt_t *c, unsigned index, const asi_ctt_call_t *c
             }
             const unsigned pair = (selector + ASI_CTT3_AA_OFFSET) & 3u;
             const unsigned clock = (selector ^ (ASI_CTT3_AA_INVERTED ? 1u : 0u)) & 1u;
-            s->nibble = (uint8_t)(clock << 2 | ((s->snapshot >> (2u * pair) ^ LINE) & 3u));
+            s->nibble = (uint8_t)(clock << 2 | (((unsigned)s->snapshot >> (2u * pair) ^ LINE) & 3u));
         }
     }
     if ((c->status[index] & ASI_CTT_TV) != 0u && ctt_elapsed(call->now_us, s->last_us, ASI_CTT3_TIMEOUT_MS)) {
