@@ -31,7 +31,8 @@ def c_header(table):
     lines = ["/* SPDX-License-Identifier: Apache-2.0 */", f"/* {NOTE} */",
              "#ifndef ASI_CTT_TABLE_H", "#define ASI_CTT_TABLE_H"]
     for group, key, value, exp, doc in table:
-        lines.append(f"#define ASI_{group.upper()}_{key.upper()} {value} /**< {'experimental: ' * exp}{doc} */")
+        name = f"ASI_{group.upper()}_{key.upper()}"  # each may be overridden with -D, to build the alternatives
+        lines += [f"/** {'experimental: ' * exp}{doc} */", f"#ifndef {name}", f"#define {name} {value}", "#endif"]
     return "\n".join([*lines, "#endif", ""])
 
 

@@ -62,7 +62,68 @@ typedef struct {
     uint8_t bytes[ASI_CTT2_MESSAGE_BYTES];
 } asi_string_t;
 
-enum { ASI_CTT_SLAVE_WORDS = 12 };  /* private state of an engine per slave */
+/** Private to asi_ctt1.c: one input or output slave. */
+typedef struct {
+    uint32_t frame;          /**< triples received, or value or sequence to send; the last triple in bits 2..0 */
+    uint32_t last_us;        /**< last accepted triple */
+    uint32_t update_us;      /**< outputs: last value taken by the slave */
+    uint8_t nibble;          /**< on its way until accepted, before invert_out */
+    uint8_t mode, t, first;  /**< t: triple on its way, 0 = last; first: triple a value begins with */
+    uint8_t channel, channels, align;
+    bool output, transparent, strings;
+    bool drop;               /**< the triple on its way is to be thrown away, then a value begins */
+    bool quiet;              /**< held, and the nibble was accepted: the slave has served all it has seen */
+    bool other_mode;         /**< the slave was in a string mode since asi_ctt_hold */
+    uint8_t wanted;          /**< outputs: triple the slave asked for while held */
+    uint16_t budget;         /**< accepted triples until a string must be over */
+} asi_ctt1_t;
+
+/** Private to asi_ctt2.c. */
+typedef struct {
+    uint32_t since_us, try_us;  /**< begin of waiting for a response; of the attempts to read the ID object */
+    uint16_t position, length;  /**< bytes sent or received of the message; length 0: a gap ends it */
+    uint8_t step, service, level, half;  /**< level: clock and data bits on their way */
+    uint8_t tx, tx_bits, rx, rx_bits;
+    uint8_t clock, still;    /**< slave's clock bit; calls without an edge of it */
+    uint8_t quiet;           /**< calls of a gap */
+    uint8_t fails;
+    uint8_t in_bytes, out_bytes, in_mask, out_mask;
+    uint8_t code;            /**< first byte of the request */
+    uint8_t reads;           /**< data bytes that the request asks for */
+    bool two_words;          /**< A or B slave */
+    bool known, put;         /**< the ID object was read; the next cyclic service is put */
+    uint8_t bytes[10];
+} asi_ctt2_t;
+
+/** Private to asi_ctt3.c. */
+typedef struct {
+    uint32_t last_us;        /**< last whole round */
+    uint8_t nibble, snapshot, inputs;
+    uint8_t selector;        /**< 8 I/O: of the last answer; 4 = none yet. 4 I/O: 1 = pair 3, 2 is on its way */
+    uint8_t run;             /**< 8 I/O: next selector of an unbroken run; 8 = broken */
+} asi_ctt3_t;
+
+/** Private to asi_ctt4.c. */
+typedef struct {
+    uint32_t last_us;
+    uint16_t value;
+    uint8_t nibble, number, channel;
+    bool two;
+} asi_ctt4_t;
+
+/** Private to asi_ctt5.c: polls left during which a safety channel counts as closed. */
+typedef struct {
+    uint8_t polls[2];
+} asi_safety_t;
+
+typedef union {
+    asi_ctt2_t two;          /**< the largest, so that {0} clears all */
+    asi_ctt1_t one;
+    asi_ctt3_t three;
+    asi_ctt4_t four;
+    asi_safety_t safety;
+    uint8_t group;           /**< CTT5: members of the group that begins here */
+} asi_ctt_slave_t;
 
 typedef struct {
     /* what the host sees */
@@ -74,14 +135,17 @@ typedef struct {
     uint16_t ao[ASI_ANALOG_WORDS];   /**< AODI */
     asi_string_t string;
     /* private */
-    uint8_t kind[ASI_INDICES];
-    asi_list_t open, live;
-    uint32_t slave[ASI_INDICES][ASI_CTT_SLAVE_WORDS];
+    uint8_t kind[ASI_INDICES];       /**< asi_ctt_kind_t; NONE while not open */
+    asi_list_t live;
+    asi_list_t groups, safety;       /**< open members of CTT5 groups; open safety slaves */
+    asi_list_t grouped;              /**< first members of groups whose value is shown */
+    asi_list_t swapped;              /**< CTT2 slaves with data and clock swapped; kept over close and open */
+    asi_ctt_slave_t slave[ASI_INDICES];
 } asi_ctt_t;
 
 /** Kind for these codes (IO 3..0, ID 7..4, ID1 11..8, ID2 15..12). */
 asi_ctt_kind_t asi_ctt_kind(uint16_t codes);
-/** Nothing open; all values are substitutes of nothing: 0. */
+/** Nothing open; all values 0. */
 void asi_ctt_init(asi_ctt_t *c);
 /** The slave entered LAS. @return true when its slot must be live: asi_ctt_call then gives each next nibble */
 bool asi_ctt_open(asi_ctt_t *c, unsigned index, uint16_t codes, uint32_t now_us);
@@ -100,8 +164,20 @@ void asi_ctt_cycle(asi_ctt_t *c, const asi_list_t *las, const asi_list_t *called
                    const uint16_t codes[ASI_INDICES], uint32_t in[ASI_IMAGE_WORDS], uint32_t out[ASI_IMAGE_WORDS]);
 /** Members of incomplete CTT5 groups in LAS: a configuration error (CT-052). */
 asi_list_t asi_ctt_incomplete(const asi_ctt_t *c, const asi_list_t *las, const uint16_t codes[ASI_INDICES]);
-/** Begin a string or message of c->string.bytes (length: bytes to write). The caller has set the slave's parameter.
- * @return ASI_E_NOT_ACTIVE, ASI_E_PROFILE, ASI_E_OVERFLOW, ASI_E_BUSY; else progress shows in c->string */
+/** Before the WPAR that selects a string mode of a CTT1 slave: cyclic values pause. A slave that changes its mode between
+ * two triples would else mix a value of both. Call it until true, about once per cycle, then send WPAR.
+ * @return true: the slave has served all calls so far (or has no CTT1) and WPAR may go out */
+ASI_MUST_USE bool asi_ctt_hold(asi_ctt_t *c, unsigned index);
+/** After the WPAR that selects normal data again, or when a string was given up: values go on with their first triple.
+ * A string still open ends with ASI_E_ABORTED. Nothing for other kinds. */
+void asi_ctt_release(asi_ctt_t *c, unsigned index, uint32_t now_us);
+/** Begin a string or message of c->string.bytes (length: bytes to write). Strings: between asi_ctt_hold and
+ * asi_ctt_release, the caller has set the slave's parameter; whole sequences of 3 bytes, F and V are made here. Messages
+ * need no hold.
+ * @return ASI_E_NOT_ACTIVE, ASI_E_PROFILE, ASI_E_BUSY, ASI_E_STATE (not held), ASI_E_OVERFLOW, ASI_E_ARG (not whole
+ * sequences; no request code of CTT2 or a length that does not go with it); else progress shows in c->string: status
+ * ASI_OK, ASI_E_TRANSFER, ASI_E_OVERFLOW (the slave has more), ASI_E_DEVICE (bytes: its error response), ASI_E_ABORTED;
+ * length: bytes of the result */
 ASI_MUST_USE asi_status_t asi_ctt_string(asi_ctt_t *c, unsigned index, asi_string_kind_t kind, unsigned length,
                                          uint32_t now_us);
 #endif

@@ -11,3 +11,6 @@ def pytest_sessionfinish():
     import native
     if native.load.cache_info().currsize:
         native.load()[1].fw_counters_write()
+    import native_ctt
+    for lib in native_ctt.OPENED:
+        lib.fc_counters_write()
