@@ -3,6 +3,7 @@
 
 The masters here follow the rules of the line as a master has them; they know nothing of the model but its nibbles.
 """
+from contextlib import nullcontext
 from unittest.mock import patch
 
 import pytest
@@ -23,7 +24,7 @@ SINGLE_LOSSES = LOSSES.map(lambda steps: [s for step in steps for s in ((step,) 
 
 def choices(**values):
     """The table with other choices."""
-    return patch.multiple(table, **values)
+    return patch.multiple(table, **values) if values else nullcontext()
 
 
 class Wire:
@@ -173,3 +174,557 @@ def test_answer_words():
     assert [response_word(a) for _, a in W1[:7]] == [0x01, 0x23, 0x13, 0x31, 0x0D, 0x29, 0x07]
     assert [response_word(a) for _, a in W2] == [0x15, 0x31, 0x0D, 0x29, 0x07, 0x23, 0x19]
     assert [response_word(a) for a in (0xC, 0xB, 0xA)] == [0x31, 0x2F, 0x29]
+
+
+# ---------------------------------------------------------------------------------------------- CTT1 under losses
+def pack(control, three):
+    return control << 3 | three if table.CTT1_TOGGLE_POS else three << 1 | control
+
+
+def line_number(t):
+    return 7 - t if table.CTT1_COUNT_UP else t
+
+
+def turned(three):
+    return int(f"{three:03b}"[::-1], 2)
+
+
+def on_line(three):
+    return three if table.CTT1_MSB_LEFT else turned(three)
+
+
+class Ctt1Master:
+    """Lock step of a master: the same nibble until an answer with the expected control bit comes."""
+
+    def __init__(self, wire):
+        self.wire, self.control = wire, table.CTT1_START_TOGGLE
+
+    def step(self, three):
+        """-> the three bits of the accepted answer."""
+        while True:
+            answer = self.wire.call(pack(self.control, three) ^ 15 * table.CTT1_INVERT_OUT)
+            if answer is None:
+                continue
+            control, got = (answer >> 3, answer & 7) if table.CTT1_TOGGLE_POS else (answer & 1, answer >> 1)
+            assert control == self.control ^ table.CTT1_ECHO_INVERTED
+            self.control ^= 1
+            return got
+
+    def read(self, triples):
+        """One frame from the slave, as an integer."""
+        frame = 0
+        for t in reversed(range(triples)):
+            frame = frame << 3 | on_line(self.step(line_number(t)))
+        return frame
+
+    def write(self, frame, triples):
+        """One frame to the slave: the slave names each next triple."""
+        t, steps = triples - 1, 0
+        while t >= 0:
+            wanted = line_number(self.step(on_line(frame >> 3 * t & 7)))
+            t, steps = (-1 if t == 0 and wanted == triples - 1 else wanted), steps + 1
+        return steps
+
+    def read_string(self):
+        """-> bytes, None when V = 0."""
+        out = b""
+        while True:
+            frame = self.read(8)
+            if not frame & 1:
+                return None
+            out += frame.to_bytes(3)
+            if not frame & 2:
+                return out
+
+    def write_string(self, string):
+        assert len(string) % 3 == 0
+        for k in range(0, len(string), 3):
+            last = k + 3 == len(string)
+            self.write(int.from_bytes(string[k:k + 3]) & ~3 | (not last) << 1 | 1, 8)
+
+
+ALTERNATIVES = [{}, {"CTT1_COUNT_UP": 1}, {"CTT1_TOGGLE_POS": 0}, {"CTT1_MSB_LEFT": 0}, {"CTT1_ECHO_INVERTED": 1},
+                {"CTT1_E_REVERSED": 1}, {"CTT1_START_TOGGLE": 1}, {"CTT1_INVERT_OUT": 1},
+                {"CTT1_COUNT_UP": 1, "CTT1_TOGGLE_POS": 0, "CTT1_MSB_LEFT": 0, "CTT1_ECHO_INVERTED": 1,
+                 "CTT1_E_REVERSED": 1, "CTT1_START_TOGGLE": 1, "CTT1_INVERT_OUT": 1}]
+WORDS = st.lists(st.integers(0, 0xFFFF), min_size=4, max_size=4)
+
+
+@given(st.sampled_from(ALTERNATIVES), st.integers(0, 3), WORDS, st.integers(0, 15), st.integers(0, 15),
+       st.sampled_from([3, 4]), LOSSES)
+@settings(max_examples=200, deadline=None, derandomize=True)
+def test_ctt1_inputs(alternative, id2, words, invalid, overflow, id, losses):
+    """SL-009, CT-003, CT-010: all channels in turn with V and O, 7 calls each, whatever calls and answers are lost."""
+    with choices(**alternative):
+        channels = (1, 2, 4, 4)[id2]
+        engine = ctt.make(7, id, 8 | id2, values=words, invalid=invalid, overflow=overflow)
+        engine.exchange(15, 0)                                  # activation
+        wire = Wire(engine, losses)
+        master = Ctt1Master(wire)
+        for k in [*range(channels), *range(channels)]:
+            frame = master.read(7)
+            e = frame >> 18
+            assert (turned(e) if table.CTT1_E_REVERSED else e) == k
+            assert frame >> 2 & 0xFFFF == words[k]
+            assert frame & 3 == (overflow >> k & 1) << 1 | (not invalid >> k & 1)
+        assert wire.cycles == 14 * channels or losses
+
+
+@given(st.sampled_from(ALTERNATIVES), st.integers(0, 3), WORDS, LOSSES)
+@settings(max_examples=200, deadline=None, derandomize=True)
+def test_ctt1_outputs(alternative, id2, words, losses):
+    """SL-009, CT-003, CT-010, CT-013: each value comes complete to its channel, whatever calls and answers are lost."""
+    with choices(**alternative):
+        channels = (1, 2, 4, 4)[id2]
+        engine = ctt.make(7, 3, id2)
+        engine.write_parameter(0xE, 0)                          # P0 = 0: it does not drop them during a long loss
+        engine.exchange(15, 0)
+        wire = Wire(engine, losses)
+        master = Ctt1Master(wire)
+        for k in range(channels):
+            e = turned(k) if table.CTT1_E_REVERSED else k
+            steps = master.write(e << 18 | words[k] << 2 | 1, 7)
+            assert steps == 7 + (k == 0 and table.CTT1_START_TOGGLE ^ table.CTT1_INVERT_OUT)
+            assert engine.outputs == words[:k + 1] + [None] * (3 - k)
+        assert wire.cycles <= 7 * channels + 1 or losses
+
+
+def test_ctt1_value_is_taken_whole():
+    """SL-009, CT-002: a change in the middle of a value is seen in the next one, never in part."""
+    engine = ctt.make(7, 3, 0xC, values=(0x0FF0,))
+    master = Ctt1Master(Wire(engine))
+    for t in (6, 5, 4):
+        master.step(t)
+    engine.values[0] = 0xF00F
+    assert [master.step(t) for t in (3, 2, 1, 0)] == [7, 7, 0, 1]       # D10.. of 0FF0
+    assert master.read(7) == 0xF00F << 2 | 1
+    for t in (6, 5, 4):
+        master.step(t)
+    engine.values[0] = 0x1111
+    assert master.read(7) == 0x1111 << 2 | 1                    # broken off and begun again: a new one
+
+
+def test_ctt1_outputs_that_are_not_taken():
+    """SL-009, CT-010: V = 0, or a channel that is not there, changes no output."""
+    engine = ctt.make(7, 3, 5)
+    master = Ctt1Master(Wire(engine))
+    master.write(1 << 18 | 5 << 2 | 1, 7)
+    for frame in (1 << 18 | 6 << 2, 2 << 18 | 7 << 2 | 1, 7 << 18 | 8 << 2 | 1):
+        master.write(frame, 7)
+    assert engine.outputs == [None, 5, None, None]
+
+
+def test_ctt1_before_the_first_triple():
+    """SL-009, CT-011: triples asked for before the first one are 000, so that the value they end has V = 0."""
+    engine = ctt.make(7, 3, 0xC, values=(0xFFFF,))
+    assert [engine.exchange((t & 1) << 3 | t, k * CYCLE_NS) for k, t in enumerate((3, 2, 1, 0))] == [8, 0, 8, 0]
+    assert engine.exchange(0b1110, CYCLE_NS * 9) == 0b1000
+    assert engine.exchange(0b0101, CYCLE_NS * 10) == 0b0111
+    assert engine.exchange(0b1111, CYCLE_NS * 11) == 0b1000     # there is no triple 7 in a value
+
+
+@pytest.mark.parametrize("triples", [3, 4, 5, 6, 7])
+def test_ctt1_short_values(triples):
+    """SL-009, CT-015: S-7.1 and S-7.2 with fewer triples: the value is left-aligned in what there is."""
+    width = 3 * (triples - 1) - 2
+    engine = ctt.make(7, 1, 8, values=(0xA5C3,), triples=triples)
+    assert Ctt1Master(Wire(engine)).read(triples) == 0xA5C3 >> 16 - width << 2 | 1
+    engine = ctt.make(7, 2, 0, triples=triples)
+    assert Ctt1Master(Wire(engine)).write(0xA5C3 >> 16 - width << 2 | 1, triples) == triples
+    assert engine.outputs[0] == 0xA5C3 >> 16 - width << 16 - width
+
+
+@pytest.mark.parametrize("p0, id, dropped", [(1, 3, True), (0, 3, False), (1, 4, False)])
+def test_ctt1_supervision(p0, id, dropped):
+    """SL-009, CT-013: without a step for 500 ms an output of S-7.3 with P0 = 1 drops; a broken value is given up."""
+    engine = ctt.make(7, id, 4 if id == 3 else 1)
+    engine.write_parameter(14 | p0 if id == 3 else 15, 0)
+    wire = Wire(engine)
+    master = Ctt1Master(wire)
+    master.write(7 << 2 | 1, 7)
+    master.step(0)
+    last = wire.now
+    for k in range(99):                                         # the same control bit: calls, but no dialogue
+        engine.exchange(0b1000 if master.control == 0 else 0, last + (k + 1) * CYCLE_NS)
+    assert engine.outputs[0] == 7
+    engine.update(last + 500 * MS - 1)
+    assert engine.outputs[0] == 7
+    engine.update(last + 500 * MS)
+    assert engine.outputs[0] == (None if dropped else 7)
+    wire.now = last + 500 * MS
+    assert master.step(0) == 5                                  # wants triple 6 first: this was it
+
+
+# ---------------------------------------------------------------------------------------------- CTT1 strings
+@given(st.sampled_from(ALTERNATIVES), st.binary(min_size=1, max_size=219), st.sampled_from([0xC, 4]), LOSSES)
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_ctt1_read_string(alternative, string, id2, losses):
+    """SL-009, CT-014: strings come complete with F and V, from input and output slaves; then values go on."""
+    with choices(**alternative):
+        engine = ctt.make(7, 4, id2, values=(0x1234,), strings={ctt.ID: string})
+        engine.exchange(15, 0)
+        master = Ctt1Master(Wire(engine, losses))
+        engine.write_parameter(table.CTT1_PAR_ID, 0)
+        engine.write_parameter(table.CTT1_PAR_ID, 0)            # its answer was lost
+        got = master.read_string()
+        sequences = -(-len(string) // 3)
+        assert len(got) == 3 * sequences
+        padded = string.ljust(3 * sequences, b"\0")
+        for k in range(sequences):
+            assert got[3 * k:3 * k + 2] == padded[3 * k:3 * k + 2]
+            assert got[3 * k + 2] == padded[3 * k + 2] & 0xFC | (k + 1 < sequences) << 1 | 1
+        assert master.read_string() == got                      # it begins again
+        engine.write_parameter(table.CTT1_PAR_DATA, 0)
+        if id2 & 8:
+            assert master.read(7) == 0x1234 << 2 | 1
+        else:
+            master.write(0x4321 << 2 | 1, 7)
+            assert engine.outputs[0] == 0x4321
+
+
+@given(st.sampled_from(ALTERNATIVES), st.integers(1, 73), st.sampled_from([0xC, 4]), LOSSES)
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_ctt1_write_string(alternative, sequences, id2, losses):
+    """SL-009, CT-014: a parameter string is taken when its last sequence is there, and can be read back."""
+    with choices(**alternative):
+        old = bytes((1, 2, 1))
+        engine = ctt.make(7, 4, id2, strings={ctt.PARAMETERS: old})
+        engine.exchange(15, 0)
+        master = Ctt1Master(Wire(engine, losses))
+        string = bytes(k * 37 & 0xFF for k in range(3 * sequences))
+        engine.write_parameter(table.CTT1_PAR_WR, 0)
+        master.write_string(string)
+        stored = engine.strings[ctt.PARAMETERS]
+        assert [b for k, b in enumerate(stored) if k % 3 < 2] == [b for k, b in enumerate(string) if k % 3 < 2]
+        engine.write_parameter(table.CTT1_PAR_DATA, 0)
+        engine.write_parameter(table.CTT1_PAR_RD, 0)
+        assert master.read_string() == stored
+
+
+def test_ctt1_strings_refused():
+    """SL-009, CT-014: no string: V = 0; V = 0 or too long in writing: the old one stays; S-7.3 has no strings."""
+    engine = ctt.make(7, 4, 0xC, strings={ctt.PARAMETERS: b"old"})
+    master = Ctt1Master(Wire(engine))
+    engine.write_parameter(0xD, 0)
+    assert master.read_string() is None
+    engine.write_parameter(0x7, 0)
+    master.write(0x414203, 8)
+    master.write(0x414200, 8)
+    master.write(0x414200, 8)
+    assert engine.strings[ctt.PARAMETERS] == b"old"
+    master.write_string(bytes(222))
+    assert engine.strings[ctt.PARAMETERS] == b"old"
+    engine.write_parameter(15, 0)
+    engine.write_parameter(0x7, 0)
+    master.write_string(bytes(219))
+    assert len(engine.strings[ctt.PARAMETERS]) == 219
+    plain = ctt.make(7, 3, 0xC, values=(0x1234,))
+    for k, row in enumerate(W1):
+        assert plain.write_parameter((0xE, 0xD, 0xB, 0x7)[k & 3], 0) == (0xE, 0xD, 0xB, 0x7)[k & 3]
+        assert plain.exchange(row[0], k * CYCLE_NS) == row[1]
+
+
+def test_ctt1_values_survive_a_parameter():
+    """SL-009, CT-014: WPAR F in the middle of a value does not disturb it."""
+    engine = ctt.make(7, 4, 0xC, values=(0x1234,))
+    for k, row in enumerate(W1):
+        engine.write_parameter(15, 0)
+        assert engine.exchange(row[0], k * CYCLE_NS) == row[1]
+
+
+def test_stray_calls_before_a_string():
+    """SL-009, CT-014: calls of the value that reach the slave after WPAR do not eat a sequence of the string."""
+    engine = ctt.make(7, 4, 0xC, values=(0x1234,), strings={0: b"abcdef"})
+    master = Ctt1Master(Wire(engine))
+    for t in (6, 5):
+        master.step(t)
+    engine.write_parameter(0xE, 0)
+    assert [master.step(t) for t in (4, 3, 2, 1, 0)] == [0] * 5
+    assert master.read_string() == bytes((0x61, 0x62, 0x63, 0x64, 0x65, 0x65))
+
+
+# ---------------------------------------------------------------------------------------------- CTT2
+class Ctt2Master:
+    """Bytes in series: advances only after an answered call, receives in every call."""
+
+    def __init__(self, wire, swapped=False):
+        self.wire = wire
+        self.clock_bit, self.data_bit = (2, 3) if swapped else (3, 2)
+        self.clock = table.CTT2_IDLE & 1
+        self.bits = ""
+        self.extra = 0                                          # DO2
+
+    def call(self, clock, data):
+        nibble = clock << table.CTT2_DO_CLOCK | data << table.CTT2_DO_DATA | self.extra
+        while (answer := self.wire.call(nibble)) is None:
+            pass
+        now, self.parallel = answer >> self.clock_bit & 1, answer & 3
+        if now != self.clock and now == table.CTT2_RISING_EDGE:
+            self.bits += str(answer >> self.data_bit & 1)
+        self.clock = now
+
+    def idle(self, calls):
+        for _ in range(calls):
+            self.call(table.CTT2_IDLE & 1, table.CTT2_IDLE >> 1)
+
+    def send(self, message):
+        active = table.CTT2_RISING_EDGE
+        self.bits = ""
+        for byte in message:
+            for k in range(8):
+                bit = byte >> (7 - k if table.CTT2_MSB_FIRST else k) & 1
+                self.call(1 - active, bit)
+                self.call(active, bit)
+
+    def ask(self, message, length):
+        """Send a message and wait for that many bytes -> bytes received, and what follows until the line is idle."""
+        self.send(message)
+        self.idle(16 * length + 8)
+        return self.received()
+
+    def received(self):
+        assert len(self.bits) % 8 == 0
+        octets = [self.bits[k:k + 8] for k in range(0, len(self.bits), 8)]
+        return bytes(int(o if table.CTT2_MSB_FIRST else o[::-1], 2) for o in octets)
+
+
+OBJECTS = {0: bytes((0x12, 0x34, 0x56, 0x78, 0x22, 7)), 5: b"hello", 9: bytes(220)}
+CTT2 = [(7, 5, 5), (7, 0xA, 5), (0xB, 0xA, 5)]
+CTT2_CHOICES = [{}, {"CTT2_MSB_FIRST": 0}, {"CTT2_RISING_EDGE": 0}, {"CTT2_IDLE": 0}, {"CTT2_IDLE": 1},
+                {"CTT2_DI_DATA": 3, "CTT2_DI_CLOCK": 2}]
+
+
+@pytest.mark.parametrize("message, response", [
+    ("10 00 05", "50 12 34 56 78 22"), ("10 00 06", "50 12 34 56 78 22 07"), ("10 00 07", "90 02"),
+    ("10 00 00", "90 02"), ("10 05 05", "50 68 65 6C 6C 6F"), ("10 04 01", "90 01"), ("12 05 01", "52 68"),
+    ("12 04 01", "92 01"), ("11 05 05 41 42 43 44 45", "51"), ("11 05 04 41 42 43 44", "91 02"),
+    ("11 00 05 41 42 43 44 45", "91 01"), ("11 05 00", "91 02"), ("13 05 05 41 42 43 44 45", "53"),
+    ("13 06 01 00", "93 01"), ("1D 05 02 05 41 42 43 44 45", "5D 41 42"), ("1D 05 06 05 41 42 43 44 45", "9D 02"),
+    ("1D 05 00 05 41 42 43 44 45", "5D"), ("1D 05 05 00", "9D 02"), ("1D 08 01 01 00", "9D 01"),
+    ("00", "AB CD"), ("01 12 34", ""), ("1F 01 02 03", "9F 03"), ("77", "F7 03"), ("05 05", "")])
+@pytest.mark.parametrize("codes", CTT2)
+def test_ctt2_messages(codes, message, response):
+    """SL-009, CT-021: every code of the table with its good response and its errors; unknown codes end with a gap."""
+    engine = ctt.make(*codes, values=(0xABCD,), strings=OBJECTS)
+    master = Ctt2Master(Wire(engine))
+    assert master.ask(bytes.fromhex(message), 8) == bytes.fromhex(response)
+    assert master.ask(bytes.fromhex("10 00 05"), 6) == bytes.fromhex("50 12 34 56 78 22")   # ready for the next one
+
+
+def test_ctt2_objects():
+    """SL-009, CT-021: a written object reads back; a slave that is busy says so; device errors follow the standard one."""
+    engine = ctt.make(7, 5, 5, strings=OBJECTS, busy=1)
+    engine.device_error = b"\x42"
+    master = Ctt2Master(Wire(engine))
+    assert master.ask(bytes.fromhex("11 05 05 01 02 03 04 05"), 2) == b"\x91\x04"
+    assert engine.strings[5] == b"hello"
+    assert master.ask(bytes.fromhex("11 05 05 01 02 03 04 05"), 2) == b"\x51"
+    assert master.ask(bytes.fromhex("10 05 03"), 4) == bytes.fromhex("50 01 02 03")
+    assert master.ask(bytes.fromhex("12 07 01"), 3) == bytes.fromhex("92 01 42")
+    assert master.ask(bytes.fromhex("10 07 01"), 3) == bytes.fromhex("90 01")
+    assert len(master.ask(bytes.fromhex("10 09 DC"), 221)) == 221
+    assert OBJECTS[5] == b"hello"                               # the caller's dictionary is not ours
+
+
+@pytest.mark.parametrize("configuration, inputs, outputs", [
+    (0x00, "", 0), (0x11, "22", 1), (0x22, "11 22", 2), (0x23, "11 22 33 44", 2), (0x32, "11 22", 4),
+    (0x44, "11 22 33 44 55 66", 6), (0xDD, "11 22 33 44 55 66 77 88", 8), (0x76, "", 0)])
+def test_ctt2_cyclic(configuration, inputs, outputs):
+    """SL-009, CT-021: cyclic inputs and outputs have the lengths of the I/O configuration byte; no answer to code 01."""
+    engine = ctt.make(7, 5, 5, values=(0x1122, 0x3344, 0x5566, 0x7788), strings={0: bytes((0, 0, 0, 0, configuration))})
+    master = Ctt2Master(Wire(engine))
+    assert master.ask(b"\0", 9) == bytes.fromhex(inputs)
+    data = bytes(range(0xA1, 0xA1 + outputs))
+    master.send(b"\1" + data[:-1])
+    assert engine.outputs == [None] * 4 or not outputs
+    master.send(data[-1:])
+    words = [0xA1] if outputs == 1 else [0xA1A2, 0xA3A4, 0xA5A6, 0xA7A8][:outputs // 2]
+    assert engine.outputs == words + [None] * (4 - len(words))
+    master.idle(20)
+    assert master.received() == b""
+
+
+@given(st.sampled_from(CTT2_CHOICES), st.sampled_from(CTT2), st.booleans(), SINGLE_LOSSES)
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_ctt2_losses(alternative, codes, swapped, losses):
+    """SL-009, CT-003, CT-020: a call or an answer lost and repeated at once costs no clock level in either direction."""
+    with choices(**alternative):
+        engine = ctt.make(*codes, strings=OBJECTS, swapped=swapped)
+        wire = Wire(engine, losses)
+        master = Ctt2Master(wire, swapped != (table.CTT2_DI_DATA == 3))
+        master.clock = table.CTT2_IDLE & 1
+        assert master.ask(bytes.fromhex("11 05 03 41 42 43"), 2) == b"\x91\x02"
+        assert master.ask(bytes.fromhex("11 05 05 41 42 43 44 45"), 2) == b"\x51"
+        assert master.ask(bytes.fromhex("10 05 05"), 6) == b"\x50ABCDE"
+        calls = 16 * (6 + 8 + 3) + (16 * 2 + 8) * 2 + 16 * 6 + 8
+        assert wire.cycles == calls                             # none lost altogether, none needed twice
+
+
+def test_ctt2_rate():
+    """SL-009, CT-020: 16 calls a byte: the response begins in the call that completes the request."""
+    engine = ctt.make(7, 0xA, 5, strings=OBJECTS)
+    master = Ctt2Master(Wire(engine))
+    master.send(bytes.fromhex("10 00 05"))
+    master.idle(16 * 6 - 1)
+    assert master.received() == bytes.fromhex("50 12 34 56 78 22") and master.wire.cycles == 16 * 9 - 1
+
+
+def test_ctt2_gap():
+    """SL-009, CT-020: 8 calls without an edge clear the receiver, 7 do not; repetitions are no calls of their own."""
+    for still, good in ((7, True), (8, False)):
+        engine = ctt.make(7, 5, 5, strings=OBJECTS)
+        master = Ctt2Master(Wire(engine))
+        master.send(b"\x10")
+        master.call(0, 0)
+        for _ in range(still):
+            master.call(0, 0)
+        master.call(1, 0)                                       # first bit of 00 05
+        for k in range(15):
+            bit = 0x0005 >> 14 - k & 1
+            master.call(0, bit)
+            master.call(1, bit)
+        master.idle(16 * 6)
+        assert (master.bits[:8] == f"{0x50:08b}") == good, still
+    engine = ctt.make(7, 5, 5, strings=OBJECTS)
+    wire = Wire(engine)
+    master = Ctt2Master(wire)
+    master.send(b"\x10")
+    wire.losses = [NO_ANSWER, GOOD] * 7
+    master.idle(7)
+    master.send(b"\0\5")
+    master.idle(16 * 6)
+    assert master.received() == bytes.fromhex("50 12 34 56 78 22")
+
+
+def test_ctt2_repetition_by_time():
+    """SL-009, CT-003: the same nibble within 224 us of an answered call is a repetition, later or other it is a call."""
+    engine = ctt.make(7, 0xA, 5, strings=OBJECTS)
+    master = Ctt2Master(Wire(engine))
+    master.send(bytes.fromhex("10 05 05"))
+    t = master.wire.now
+    assert engine.exchange(0b011, t + 223_999) == 0b0000        # first level of the response again
+    assert engine.exchange(0b011, t + 223_999 + 224_000) == 0b1000
+    assert engine.exchange(0b001, t + 448_000) == 0b0100        # another nibble: no repetition, however soon
+
+
+def test_ctt2_parallel_bits():
+    """SL-009, CT-023: DI0 and DI1 stay inputs of the slave, DO2 does not disturb; S-B.A.5 has none."""
+    for codes, parallel in zip(CTT2, (2, 2, 0)):
+        engine = ctt.make(*codes, strings=OBJECTS)
+        engine.inputs = 0b1110
+        master = Ctt2Master(Wire(engine))
+        master.extra = 4
+        assert master.ask(bytes.fromhex("10 05 05"), 6) == b"\x50hello"
+        assert master.parallel == parallel
+
+
+def test_ctt2_new_request_during_a_response():
+    """SL-009, CT-022: a new request ends the response that is still running."""
+    engine = ctt.make(7, 5, 5, strings=OBJECTS)
+    master = Ctt2Master(Wire(engine))
+    master.send(bytes.fromhex("10 09 DC"))
+    master.idle(41)
+    master.send(bytes.fromhex("10 05 05"))
+    master.bits = master.bits[-1:] if master.clock else ""
+    master.idle(16 * 6 + 20)
+    assert master.bits[-48:] == "".join(f"{b:08b}" for b in b"\x50hello")
+
+
+# ---------------------------------------------------------------------------------------------- CTT3
+@given(st.lists(st.integers(0, 15), min_size=1, max_size=20), LOSSES, st.sampled_from([0, 1]))
+@settings(max_examples=100, deadline=None, derandomize=True)
+def test_mux4_losses(words, losses, inverted):
+    """SL-009, CT-003, CT-030: four outputs change together, whatever calls and answers are lost and repeated."""
+    with choices(CTT3_INVERT_OUT=inverted):
+        engine = ctt.make(7, 0xA, 7)
+        wire = Wire(engine, losses)
+
+        def send(nibble):
+            while wire.call(nibble) is None:
+                pass
+        previous = None
+        for word in words:
+            send(4 | word >> 2 ^ 3 * inverted)
+            assert engine.outputs[0] == previous
+            send(word & 3 ^ 3 * inverted)
+            assert engine.outputs[0] == word
+            previous = word
+
+
+@given(st.lists(st.tuples(st.integers(0, 255), st.integers(0, 255)), min_size=1, max_size=8), LOSSES,
+       st.sampled_from([{}, {"CTT3_AA_OFFSET": 1}, {"CTT3_AA_INVERTED": 0}, {"CTT3_INVERT_OUT": 0}]))
+@settings(max_examples=100, deadline=None, derandomize=True)
+def test_mux8_losses(words, losses, alternative):
+    """SL-009, CT-003, CT-031: bytes both ways are consistent, whatever calls and answers are lost and repeated."""
+    with choices(**alternative):
+        engine = ctt.make(7, 0xA, 0xA, values=(words[0][1],))
+        # the first call, repeated, is taken for a confirmation of s = 0: here it arrives
+        wire = Wire(engine, [GOOD, *losses])
+        s, pairs, got, latched, taken = None, {}, [], None, []
+        expected = [words[0][1]]
+        for out, value in words:
+            for _ in range(4):
+                if s is None:
+                    nibble = 7
+                else:
+                    number = s + table.CTT3_AA_OFFSET & 3
+                    latched = out if number == 0 else latched
+                    confirm = s & 1 ^ table.CTT3_AA_INVERTED
+                    nibble = confirm << 2 | ((latched or 0) >> 2 * number & 3) ^ 3 * table.CTT3_INVERT_OUT
+                    if number == 3 and latched is not None:
+                        taken.append(latched)
+                while (answer := wire.call(nibble)) is None:
+                    pass
+                s = answer >> 2
+                pairs[s] = answer & 3
+                if s == 3:
+                    got.append(sum(p << 2 * k for k, p in pairs.items()))
+                    engine.values[0] = value
+                    expected.append(value)
+        assert got == expected[:len(got)] and len(got) == len(words)
+        assert engine.outputs[0] == (taken[-1] if taken else None)
+
+
+# ---------------------------------------------------------------------------------------------- CTT4, safety, reset
+def test_ctt4_placeholder():
+    """SL-009, CT-040: only when the table enables it: nibbles 3 .. 0 of a word taken at 3, once per repetition."""
+    with choices(CTT4_ENABLE=1):
+        one, two = ctt.make(7, 0xA, 8, values=(0x1234,)), ctt.make(7, 0xA, 9, values=(0x1234, 0xABCD))
+    assert [one.exchange(4 | n, 0) for n in (3, 2)] == [1, 2] and one.outputs[0] == 1
+    one.values[0] = 0xFFFF
+    assert [one.exchange(n, 0) for n in (1, 0, 3)] == [3, 4, 0xF] and one.outputs[0] == 0
+    one.values[0] = 0
+    assert [one.exchange(n, 0) for n in (3, 2)] == [0xF, 0xF]
+    assert [two.exchange(n, 0) for n in (3, 7, 2, 6, 1, 5, 0, 4)] == [1, 0xA, 2, 0xB, 3, 0xC, 4, 0xD]
+    with pytest.raises(ValueError):
+        ctt.make(7, 0xA, 8, values=(1,))
+
+
+def test_safety():
+    """SL-009, CT-060: eight words in turn; a word stays for 224 us after an answered call; open channels are 0."""
+    engine = ctt.make(0, 0xB, 0)
+    words = [engine.exchange(15, k * MS) for k in range(9)]
+    assert words == [0b0001, 0b0101, 0b0110, 0b1001, 0b1110, 0b1011, 0b1100, 0b0111, 0b0001]
+    t = 8 * MS
+    assert engine.exchange(15, t + 160_000) == 0b0001
+    assert engine.exchange(15, t + 383_999) == 0b0001           # counted from the last answer
+    assert engine.exchange(15, t + 383_999 + 224_000) == 0b0101
+    for closed, mask in ((3, 15), (2, 12), (1, 3), (0, 0)):
+        engine.reset()
+        engine.closed = closed
+        assert [engine.exchange(15, k * MS) for k in range(8)] == [w & mask for w in words[:8]]
+    own = ctt.make(7, 0xB, 15, words=range(1, 9), closed=2)
+    assert own.exchange(15, 0) == 0 and own.exchange(15, MS) == 0 and own.exchange(0, 2 * MS) == 0
+    assert own.exchange(0, 3 * MS) == 4
+
+
+@pytest.mark.parametrize("codes, calls", [
+    ((7, 3, 0xC), [0b0110, 0b1101, 0b0100]), ((7, 3, 4), [0, 8, 0, 8, 0, 8, 1, 8, 0]),
+    ((7, 5, 5), [0, 1, 0]), ((7, 0xA, 7), [7, 0, 7]), ((7, 0xA, 0xA), [7, 4, 0, 5, 1, 4]), ((0, 0xB, 0), [15, 15])])
+def test_reset(codes, calls):
+    """SL-009, SL-001: after a reset an engine is as new: the same calls, the same answers, no outputs."""
+    engine = ctt.make(*codes, values=(0x1234,))
+    first = [engine.exchange(c, k * MS) for k, c in enumerate(calls)]
+    engine.reset()
+    assert engine.outputs == [None] * 4
+    assert [engine.exchange(c, 900 * MS + k * MS) for k, c in enumerate(calls)] == first
