@@ -249,8 +249,8 @@ class Ctt2(Engine):
 
     The objects are strings[index]; object 0 is the ID object, its fifth byte the I/O configuration.
     swapped: clock on DI2 and data on DI3. busy: that many acyclic requests get the error "busy" first.
-    A call repeated within the hold time with the same nibble is the master's immediate repetition: our answer was lost,
-    and going on would skip a clock level. Losing both answers does skip one; the gap brings the receivers together again.
+    A call repeated within the hold time with the same nibble is the master's immediate repetition: our answer was
+    lost, and going on would skip a clock level. Losing both answers does skip one; the gap clears that up.
     """
 
     def __init__(self, io, swapped=False, busy=0, **common):
@@ -392,7 +392,7 @@ class Mux4(Engine):
 
 
 class Mux8(Engine):
-    """S-7.A.A: the answer says which pair it carries; the next call confirms that with I2 and carries an output pair."""
+    """S-7.A.A: the answer says which pair it carries; the next call confirms it with I2 and carries an output pair."""
 
     def reset(self):
         super().reset()
@@ -447,7 +447,7 @@ class Ctt4(Engine):
 
 
 class Safety(Engine):
-    """S-x.B: the next of eight words at every call. closed: bits 0, 1 = channel 1, 2; an open one forces its bits to 0."""
+    """S-x.B: the next of eight words at every call. closed: bits 0, 1 = channel 1, 2; an open one has its bits at 0."""
 
     def __init__(self, words=SAFETY_WORDS, closed=3, **common):
         if len(words) != 8:

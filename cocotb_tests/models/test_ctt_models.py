@@ -8,11 +8,16 @@ from unittest.mock import patch
 
 import pytest
 from asi import ctt_table as table
-from asi.telegram import encode_call, request_pulses, request_word, response_word
+from asi.checks import ANSWER_BITS, classify
+from asi.regmap import ErrorClass
+from asi.telegram import encode_call, pulses, request_pulses, request_word, response_word
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cocotb_tests.models import ctt
+from cocotb_tests.models.faults import Faults
+from cocotb_tests.models.slaves import Slave
+from cocotb_tests.models.test_models import Bench
 
 MS = 1_000_000
 CYCLE_NS, REPEAT_NS = 5 * MS, 160_000
@@ -512,7 +517,7 @@ def test_ctt2_messages(codes, message, response):
 
 
 def test_ctt2_objects():
-    """SL-009, CT-021: a written object reads back; a slave that is busy says so; device errors follow the standard one."""
+    """SL-009, CT-021: written objects read back; a busy slave says so; device errors follow the standard one."""
     engine = ctt.make(7, 5, 5, strings=OBJECTS, busy=1)
     engine.device_error = b"\x42"
     master = Ctt2Master(Wire(engine))
@@ -530,7 +535,7 @@ def test_ctt2_objects():
     (0x00, "", 0), (0x11, "22", 1), (0x22, "11 22", 2), (0x23, "11 22 33 44", 2), (0x32, "11 22", 4),
     (0x44, "11 22 33 44 55 66", 6), (0xDD, "11 22 33 44 55 66 77 88", 8), (0x76, "", 0)])
 def test_ctt2_cyclic(configuration, inputs, outputs):
-    """SL-009, CT-021: cyclic inputs and outputs have the lengths of the I/O configuration byte; no answer to code 01."""
+    """SL-009, CT-021: cyclic inputs and outputs are as long as the configuration byte says; code 01 has no answer."""
     engine = ctt.make(7, 5, 5, values=(0x1122, 0x3344, 0x5566, 0x7788), strings={0: bytes((0, 0, 0, 0, configuration))})
     master = Ctt2Master(Wire(engine))
     assert master.ask(b"\0", 9) == bytes.fromhex(inputs)
@@ -547,7 +552,7 @@ def test_ctt2_cyclic(configuration, inputs, outputs):
 @given(st.sampled_from(CTT2_CHOICES), st.sampled_from(CTT2), st.booleans(), SINGLE_LOSSES)
 @settings(max_examples=60, deadline=None, derandomize=True)
 def test_ctt2_losses(alternative, codes, swapped, losses):
-    """SL-009, CT-003, CT-020: a call or an answer lost and repeated at once costs no clock level in either direction."""
+    """SL-009, CT-003, CT-020: a call or answer lost and repeated at once costs no clock level in either direction."""
     with choices(**alternative):
         engine = ctt.make(*codes, strings=OBJECTS, swapped=swapped)
         wire = Wire(engine, losses)
@@ -597,7 +602,7 @@ def test_ctt2_gap():
 
 
 def test_ctt2_repetition_by_time():
-    """SL-009, CT-003: the same nibble within 224 us of an answered call is a repetition, later or other it is a call."""
+    """SL-009, CT-003: the same nibble within 224 us of an answered call is a repetition, any other a call."""
     engine = ctt.make(7, 0xA, 5, strings=OBJECTS)
     master = Ctt2Master(Wire(engine))
     master.send(bytes.fromhex("10 05 05"))
@@ -728,3 +733,171 @@ def test_reset(codes, calls):
     engine.reset()
     assert engine.outputs == [None] * 4
     assert [engine.exchange(c, 900 * MS + k * MS) for k, c in enumerate(calls)] == first
+
+
+# ---------------------------------------------------------------------------------------------- on the line
+class LineBench(Bench):
+    """A bench that speaks in the words of the worked sequences."""
+
+    def word(self, request):
+        """14-bit request -> 7-bit response, None without an answer."""
+        got = self.request(pulses(request, 14))
+        if not got:
+            return None
+        error, word = classify([(t - got[0][0], p) for t, p in got], ANSWER_BITS)
+        assert error is ErrorClass.OK
+        return word
+
+    def words(self, *requests):
+        return [self.word(request) for request in requests]
+
+    def activate(self, index, extended=False):
+        """WPAR F, then DEXG F, as a master does."""
+        assert self.nibble("WPAR", index, 15, extended=extended) == 15
+        assert self.nibble("DEXG", index, 15, extended=extended) is not None
+
+
+def test_w1_w4_on_the_line():
+    """SL-009, CT-010: W1 with the repeated call of W4, as words of a slave that was activated."""
+    bench = LineBench(Slave(8, id=3, id2=0xC, values=(0x1234,)))
+    bench.activate(8)
+    assert bench.words(0x041B, 0x0435, 0x0411, 0x042D, 0x042D, 0x0409, 0x0427, 0x0403, 0x0439) == [
+        0x01, 0x23, 0x13, 0x31, 0x31, 0x0D, 0x29, 0x07, 0x23]
+
+
+def test_w2_on_the_line():
+    """SL-009, CT-010: W2 as words, to the second channel of an output slave."""
+    slave = Slave(9, id=3, id2=5)
+    bench = LineBench(slave)
+    bench.activate(9)
+    assert bench.words(0x0487, 0x04A5, 0x0487, 0x04BB, 0x0487, 0x04A3, 0x0487) == [
+        0x15, 0x31, 0x0D, 0x29, 0x07, 0x23, 0x19]
+    assert slave.ctt.outputs == [None, 0x2710, None, None]
+    bench.call("RES", 9)
+    assert slave.ctt.outputs == [None] * 4                      # a reset drops them
+
+
+def test_w3_on_the_line():
+    """SL-009, CT-014: the parameter calls of W3 choose the string; WPAR F brings values back."""
+    slave = Slave(8, id=4, id2=0xC, values=(0x1234,), strings={ctt.ID: b"AB", ctt.DIAGNOSIS: b"CD"})
+    bench = LineBench(slave)
+    bench.activate(8)
+    triples = [encode_call("DEXG", 8, (k & 1) << 3 | 7 - k) for k in range(8)]
+
+    def read():
+        return sum((bench.word(request_word(call)) >> 2 & 7) << 3 * (7 - k) for k, call in enumerate(triples))
+    assert bench.words(0x047B) == [response_word(0xE)] and read() == 0x414201
+    assert bench.words(0x0477) == [response_word(0xD)] and read() == 0x434401
+    assert bench.words(0x046F) == [response_word(0xB)] and read() == 0
+    assert bench.words(0x047D) == [response_word(0xF)]
+    assert bench.words(0x041B, 0x0435, 0x0411, 0x042D) == [0x01, 0x23, 0x13, 0x31]
+
+
+def test_w5_w6_on_the_line():
+    """SL-009, CT-020, CT-023: 5A gets a byte with DO2 = 1 and answers an unknown index; 5B has its own conversation."""
+    a, b = Slave(5, id=0xA, id2=5, inputs=0, strings=OBJECTS), Slave(37, id=0xA, id2=5, inputs=3, strings=OBJECTS)
+    bench = LineBench(a, b)
+    bench.activate(5, extended=True)
+    bench.activate(37)
+    zero, one = (0x02B1, 0x02B7), (0x02BB, 0x02BD)
+    sent = [w for bit in "00010000" "00110000" "00000001" for w in (one if bit == "1" else zero)]
+    assert set(bench.words(*sent[:-1])) == {0x31}               # idle: clock and data 1
+    assert bench.words(sent[-1]) == [0x13]                      # first bit of 90 01
+    bits = {0: (0x01, 0x23), 1: (0x13, 0x31)}
+    assert bench.words(*[0x02BD] * 31) == [
+        w for bit in f"{0x9001:016b}" for w in bits[int(bit)]][1:]
+    assert bench.nibble("DEXG", 37, 3) == 0b1111 and a.outputs == 15 and b.outputs == 0b1011
+
+
+def test_w7_on_the_line():
+    """SL-009, CT-030: W7: 5A and 5B change their four outputs, each at its own falling edge of I2."""
+    a, b = Slave(5, id=0xA, id2=7, inputs=9), Slave(37, id=0xA, id2=7, inputs=6)
+    bench = LineBench(a, b)
+    bench.activate(5, extended=True)
+    bench.activate(37)
+    assert bench.words(0x02B7, 0x0295, 0x02A5) == [response_word(9), response_word(6), response_word(9)]
+    assert (a.ctt.outputs[0], b.ctt.outputs[0]) == (0b1010, None)
+    assert bench.words(0x0287) == [response_word(6)] and b.ctt.outputs[0] == 0b1010
+
+
+def test_w8_on_the_line():
+    """SL-009, CT-031: W8 as words. DEXG F of the activation is the call before the first answer."""
+    slave = Slave(5, id=0xA, id2=0xA, values=(0x3C,))
+    bench = LineBench(slave)
+    assert bench.nibble("WPAR", 5, 15, extended=True) == 15
+    assert bench.words(0x02BD, 0x02BB, 0x02A9, 0x02B7, 0x02A5, 0x02BB) == [0x01, 0x1F, 0x2F, 0x31, 0x01, 0x1F]
+    assert slave.ctt.outputs[0] == 0xA5
+
+
+def test_w9_on_the_line():
+    """SL-009, CT-050: W9: three addresses of a CTT5 slave are three plain slaves to the line."""
+    slaves = [Slave(number, io=6, id=0, id2=id2, inputs=value)
+              for number, id2, value in ((3, 0xB, 0xC), (4, 6, 0xB), (5, 5, 0xA))]
+    bench = LineBench(*slaves)
+    for number in (3, 4, 5):
+        bench.activate(number)
+    assert bench.words(0x01B1, 0x0235, 0x02BB) == [0x31, 0x2F, 0x29]
+    assert [s.outputs for s in slaves] == [0b1100, 0b1101, 0b1110] and slaves[0].ctt is None
+
+
+def test_safety_on_the_line():
+    """SL-009, CT-060: a repetition within 224 us gets the same word, the next cycle the next one; not before WPAR."""
+    bench = LineBench(Slave(5, io=0, id=0xB))
+    call = request_pulses(encode_call("DEXG", 5, 15))
+    assert bench.request(call) == []
+    bench.nibble("WPAR", 5, 15)
+
+    def word(wait_ns):
+        got = bench.request(call, wait_ns)
+        return classify([(t - got[0][0], p) for t, p in got], ANSWER_BITS)[1] >> 2
+    # from last pulse to last pulse: 78 us and the wait
+    assert [word(w) for w in (82_000, 145_999, 146_000, MS, MS)] == [1, 1, 1, 5, 6]
+
+
+def test_answers_lost_on_the_line():
+    """SL-009, SL-008, CT-003: an answer that is disturbed on the line costs a repetition and nothing else."""
+    slave = Slave(8, id=3, id2=0xC, values=(0x1234,), faults=Faults(parity=0.4))
+    bench = LineBench(slave, seed=3)
+    call, calls = 0, 0
+    bench.nibble = None                                         # answers are judged below
+    while not slave.parameter == 15 or slave.dexg_disabled:
+        bench.request(request_pulses(encode_call("WPAR", 8, 15)))
+    frame, control = 0, 0
+    for t in (6, 5, 4, 3, 2, 1, 0):
+        call = request_pulses(encode_call("DEXG", 8, control << 3 | t))
+        while True:
+            calls += 1
+            got = bench.request(call)
+            error, word = classify([(ns - got[0][0], p) for ns, p in got], ANSWER_BITS)
+            if error is ErrorClass.OK:
+                break
+        assert word >> 5 & 1 == control
+        frame, control = frame << 3 | word >> 2 & 7, control ^ 1
+    assert frame == 0x1234 << 2 | 1 and calls > 7
+
+
+def test_spoilt_memory_ends_the_transaction():
+    """SL-009, SL-005: with IO and ID lost the slave is a plain one."""
+    slave = Slave(0, id=3, id2=0xC, values=(0x1234,))
+    bench = LineBench(slave)
+    bench.call("ADRA", data=5)
+    bench.net.power(False)
+    bench.net.power(True)
+    bench.wait(MS * 20)
+    assert slave.ctt is None and bench.nibble("RDID", 0) == 15
+    with pytest.raises(ValueError):
+        Slave(5, values=(1,))
+
+
+def test_supervision_on_the_line():
+    """SL-009, CT-013: the outputs of S-7.3 drop when nobody calls for half a second."""
+    slave = Slave(9, id=3, id2=4)
+    bench = LineBench(slave)
+    bench.activate(9)
+    for nibble in (0, 8, 0, 8, 0, 8, 1):
+        bench.nibble("DEXG", 9, nibble)
+    assert slave.ctt.outputs[0] == 0
+    bench.wait(499 * MS)
+    assert slave.ctt.outputs[0] == 0
+    bench.wait(MS)
+    assert slave.ctt.outputs[0] is None
