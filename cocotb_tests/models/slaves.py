@@ -7,6 +7,7 @@ from random import Random
 
 from asi.checks import HALF_BIT_NS, QUIET_ASYNC_NS, QUIET_NS, REQUEST_BITS, RequestCollector, WIN_LATE_NS, end_ns
 
+from . import ctt
 from .faults import Faults
 
 ANSWER_SYNC_NS = 21_500         # last request pulse to first answer pulse
@@ -27,10 +28,21 @@ S0_WRITING, S1_PERIPHERY, S3_MEMORY = 1, 2, 8
 
 
 class Slave:
-    """One slave: registers, reset, watchdog, non-volatile memory. It knows no pulses, only calls and times."""
+    """One slave: registers, reset, watchdog, non-volatile memory. It knows no pulses, only calls and times.
 
-    def __init__(self, address, io=7, id=0xF, id1=0xF, id2=0xF, inputs=0, watchdog=False, present=True, faults=None):
-        """address: index 0, 1..31, 33..63. A B index needs ID = A and sets ID1 bit 3; ValueError otherwise."""
+    ctt: the engine of its combined transaction (models/ctt.py: values, outputs, strings ...), None for plain nibbles.
+    The options of SL-010 may be changed at any time; they hold for the next call that asks for them.
+    """
+
+    def __init__(self, address, io=7, id=0xF, id1=0xF, id2=0xF, inputs=0, watchdog=False, present=True, faults=None, *,
+                 write_ns=WRITE_NS, write_fails=False, id1_locked=False, old=False, sel_at_zero=False, **transaction):
+        """address: index 0, 1..31, 33..63. A B index needs ID = A and sets ID1 bit 3; ValueError otherwise.
+
+        write_ns: time of a memory write. write_fails: it ends with S3 = 1 and the old content; until a reset the new
+        values hold. id1_locked: WID1 that changes the low three bits is not answered. old: RID1 and RID2 are not
+        answered. sel_at_zero: at address 0 an A/B slave obeys the select of its ID1, else Sel = 0.
+        transaction: options of ctt.make(), as values, strings.
+        """
         number, sel = address & 31, address >> 5
         if not 0 <= address <= 63 or address == 32:
             raise ValueError(f"address index {address}")
@@ -44,10 +56,13 @@ class Slave:
         self.plugged = present                      # on the cable
         self.present = False                        # ... and powered
         self.faults = faults or Faults()
+        self.write_ns, self.write_fails, self.id1_locked = write_ns, write_fails, id1_locked
+        self.old, self.sel_at_zero = old, sel_at_zero
+        self.ctt = ctt.make(io, id, id2, **transaction)
         self.periphery_fault = False
         self.requests = self.answers = 0
         self._memory = (self.number, self.id1)      # non-volatile address and ID1
-        self._memory_ok = True
+        self._memory_ok = self._write_good = True
         self._writing_until = -1
         self._defaults(NEVER)
 
@@ -80,6 +95,8 @@ class Slave:
         self.dexg_disabled = True
         self.synchronous = False
         self.ready_ns = self._served_ns = ready_ns
+        if self.ctt:
+            self.ctt.reset()
 
     def power_up(self, t_ns):
         """The supply comes (or the slave is plugged in)."""
@@ -93,13 +110,16 @@ class Slave:
             self._memory = (0, self._memory[1])
             self._memory_ok = False
             self.io = self.id = 0xF
+            self.ctt = None
         self._writing_until = -1
         self.present = False
 
     def update(self, t_ns):
         """Let time-outs up to t_ns happen."""
         if 0 <= self._writing_until <= t_ns:
-            self._memory_ok = True                  # S3 tells of the last write, and this one went well
+            self._memory_ok = self._write_good      # S3 tells of the last write
+        if self.ctt and self.present:
+            self.ctt.update(t_ns)
         while self.watchdog and self.number and self.present:
             expiry = max(self._served_ns + WATCHDOG_NS, self._writing_until)
             if t_ns < expiry:
@@ -134,33 +154,50 @@ class Slave:
             self.parameter = info & 15
             self.dexg_disabled = False
             self._served_ns = t_ns
-            return self.parameter
+            return self.ctt.write_parameter(self.parameter, t_ns) if self.ctt else self.parameter
         if self.dexg_disabled:
             return None
         self.outputs = info & 15
         self._served_ns = t_ns
         echoed = OUTPUT_ONLY[self.io] & (7 if self.extended else 15)    # D3 of an A/B slave is an input
-        return self.outputs & echoed | self.inputs & ~echoed & 15
+        return self.outputs & echoed | self._inputs(info, t_ns) & ~echoed & 15
+
+    def _inputs(self, info, t_ns):
+        """What a DEXG reads at the ports, or from the engine behind them."""
+        if not self.ctt:
+            return self.inputs
+        self.ctt.inputs = self.inputs
+        return self.ctt.exchange(info & (7 if self.extended else 15), t_ns)
 
     def _address(self, new, t_ns):
         """ADRA: the new address holds at once and is then written."""
         self.requests += 1
         self.number = new
         self._served_ns = t_ns                                          # the watchdog starts with the address
-        self._memory = (new, self._memory[1])
-        self._writing_until = t_ns + WRITE_NS
+        self._write((new, self._memory[1]), t_ns)
         return 6
 
     def _write_id1(self, id1, t_ns):
+        if self.id1_locked and (id1 ^ self.id1) & 7:
+            return None
         self.requests += 1
         self.id1 = id1
-        self._memory = (self._memory[0], id1)                           # after DELA the old address is still stored
-        self._writing_until = t_ns + WRITE_NS
+        self._write((self._memory[0], id1), t_ns)                       # after DELA the old address is still stored
         return 0
+
+    def _write(self, memory, t_ns):
+        """Write the non-volatile memory."""
+        self._write_good = not self.write_fails
+        if self._write_good:
+            self._memory = memory
+        self._writing_until = t_ns + self.write_ns
 
     def _command(self, info, t_ns):
         """Commands with the select bit in I3, some of them inverted."""
-        plain = info ^ self.sel << 3
+        sel = self.sel if self.number or self.sel_at_zero else 0
+        plain = info ^ sel << 3
+        if self.old and plain in (0b10010, 0b10011):                    # RID1, RID2
+            return None
         answer = {0b00000: 0, 0b11100: 6, 0b11110: self.status(t_ns),   # DELA, RES, RDST
                   0b10000: self.io, 0b10001: self.id, 0b10010: self.id1, 0b10011: self.id2}.get(plain)
         if answer is not None:

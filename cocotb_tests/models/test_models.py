@@ -451,14 +451,119 @@ def test_write_id1():
     slave = Slave(0, id=0xA, id1=7)
     bench = Bench(slave)
     assert bench.nibble("WID1", data=0xF) == 0 and slave.id1 == 15
-    assert bench.call("RDST", 0) is None        # it obeys Sel = 1 now
-    assert bench.request(request_pulses(1 << 10 | 0b10110))      # RDST with Sel = 1 at address 0
-    assert slave.status(bench.line.now) == 1
+    assert bench.nibble("RDST", 0) == 1
     bench.wait(WRITE_NS)
-    assert slave.status(bench.line.now) == 0
+    assert bench.nibble("RDST", 0) == 0
     assert bench.nibble("ADRA", data=4) == 6 and slave.address == 36
     assert bench.nibble("RID1", 36) == 15
     assert bench.call("WID1", data=3) is None
+
+
+SEL_1_AT_0 = {"RDIO": 0b11000, "RDID": 0b11001, "RID1": 0b11010, "RID2": 0b11011, "RDST": 0b10110, "RES": 0b10100}
+
+
+@pytest.mark.parametrize("sel_at_zero", [False, True])
+@pytest.mark.parametrize("name", SEL_1_AT_0)
+def test_select_at_address_0(name, sel_at_zero):
+    """SL-010, AD-007: at address 0 an A/B slave obeys Sel = 0, or with the option the select of its ID1 bit 3."""
+    slave = Slave(44, id=0xA, sel_at_zero=sel_at_zero)
+    bench = Bench(slave)
+    assert bench.nibble("DELA", 44) == 0 and slave.address == 0 and slave.id1 == 15
+    answered = [bool(bench.request(request_pulses(encode_call(name, 0)))),
+                bool(bench.request(request_pulses(1 << 10 | SEL_1_AT_0[name])))]
+    assert answered == [not sel_at_zero, sel_at_zero]
+
+
+def test_select_at_address_0_follows_id1():
+    """SL-010: WID1 that changes the select counts from then on; calls without a select reach the slave anyway."""
+    slave = Slave(0, id=0xA, id1=7, sel_at_zero=True)
+    bench = Bench(slave)
+    assert bench.nibble("RDST", 0) == 0
+    assert bench.nibble("WID1", data=0xF) == 0
+    assert bench.call("RDST", 0) is None
+    assert bench.request(request_pulses(1 << 10 | SEL_1_AT_0["RDST"]))
+    assert bench.nibble("WID1", data=7) == 0 and bench.nibble("RDST", 0) == 1
+    bench.call("WID1", data=0xF)
+    assert bench.nibble("ADRA", data=4) == 6 and slave.address == 36
+    standard = Slave(0, id1=15, sel_at_zero=True)
+    assert Bench(standard).nibble("RDIO", 0) == 7               # no A/B slave: no select
+
+
+@pytest.mark.parametrize("write_ns", [0, 2 * MS, 500 * MS])
+def test_write_time(write_ns):
+    """SL-010: S0 = 1 exactly as long as the option says, for ADRA and for WID1."""
+    slave = Slave(0, write_ns=write_ns)
+    bench = Bench(slave)
+    for name, data in (("WID1", 3), ("ADRA", 7)):
+        assert bench.nibble(name, data=data) is not None
+        start = bench.line.now - 150_000                        # last pulse of that request
+        if write_ns:
+            assert slave.status(start + write_ns - 1) == 1
+        assert slave.status(start + write_ns) == 0
+        bench.wait(write_ns)
+    assert bench.nibble("RDST", 7) == 0 and bench.nibble("RID1", 7) == 3
+
+
+def test_watchdog_waits_for_a_long_write():
+    """SL-010, SL-006: the watchdog waits for the end of a write that takes longer than itself."""
+    slave = Slave(0, watchdog=True, write_ns=300 * MS)
+    bench = Bench(slave)
+    bench.call("ADRA", data=5)
+    bench.call("WPAR", 5, 1)
+    bench.wait(290 * MS)
+    assert slave.parameter == 1
+    bench.wait(20 * MS)
+    assert slave.parameter == 15 and slave.address == 5
+
+
+def test_failing_write():
+    """SL-010: a write that fails: S0 while it runs, then S3, the new address until a reset, then the old one."""
+    slave = Slave(0, id=0xA, id1=7, write_fails=True)
+    bench = Bench(slave)
+    assert bench.nibble("WID1", data=0xD) == 0 and bench.nibble("RDST", 0) == 1
+    bench.wait(WRITE_NS)
+    assert bench.nibble("RDST", 0) == 8 and bench.nibble("RID1", 0) == 0xD
+    assert bench.nibble("ADRA", data=7) == 6 and bench.nibble("RDST", 39) == 9
+    bench.wait(WRITE_NS)
+    assert bench.nibble("RDST", 39) == 8
+    assert bench.nibble("RES", 39) == 6
+    bench.wait(RESET_NS)
+    assert [bench.nibble(name, 0) for name in ("RDST", "RID1", "RDIO")] == [8, 7, 7]    # S3 stays, the codes are good
+    slave.write_fails = False
+    assert bench.nibble("ADRA", data=7) == 6 and bench.nibble("RDST", 7) == 9
+    bench.wait(WRITE_NS)
+    assert bench.nibble("RDST", 7) == 0
+    slave.write_fails = True
+    bench.call("DELA", 7)
+    bench.call("ADRA", data=9)
+    bench.wait(WRITE_NS)
+    assert bench.nibble("RDST", 9) == 8
+    bench.net.power(False)
+    bench.net.power(True)
+    bench.wait(POWER_UP_NS)
+    assert bench.call("RDIO", 9) is None and bench.nibble("RDST", 7) == 8
+
+
+def test_locked_id1():
+    """SL-010: protected ID1: only its select bit can be changed; anything else is neither answered nor done."""
+    slave = Slave(0, id=0xA, id1=5, id1_locked=True)
+    bench = Bench(slave)
+    for id1 in range(16):
+        assert bench.nibble("WID1", data=id1) == (0 if id1 & 7 == 5 else None)
+        assert slave.id1 & 7 == 5
+    assert slave.id1 == 13
+    bench.wait(WRITE_NS)
+    bench.call("RES", 0)
+    bench.wait(RESET_NS)
+    assert bench.nibble("RID1", 0) == 13
+
+
+@pytest.mark.parametrize("index, id", [(5, 0xF), (0, 0xF), (37, 0xA)])
+def test_old_slave(index, id):
+    """SL-010, EX-005: a slave older than 2.1 answers everything but RID1 and RID2."""
+    bench = Bench(Slave(index, io=3, id=id, old=True))
+    answers = {name: bench.nibble(name, index) for name in ("RDIO", "RDID", "RID1", "RID2", "RDST")}
+    assert answers == {"RDIO": 3, "RDID": id, "RID1": None, "RID2": None, "RDST": 0}
 
 
 def test_status_bits():
