@@ -188,9 +188,11 @@ private:
             received_.clear();
             return;
         }
-        for (const unsigned shift : {16u, 8u, 0u}) received_.push_back(static_cast<uint8_t>(frame_ >> shift));
-        if (frame_ & kF && received_.size() < ASI_CTT1_STRING_BYTES) return;
-        if (!(frame_ & kF)) texts_[2] = received_;  // one that goes on beyond the longest is none
+        if (received_.size() <= ASI_CTT1_STRING_BYTES) {  // one sequence more says that it is too long
+            for (const unsigned shift : {16u, 8u, 0u}) received_.push_back(static_cast<uint8_t>(frame_ >> shift));
+        }
+        if (frame_ & kF) return;
+        if (received_.size() <= ASI_CTT1_STRING_BYTES) texts_[2] = received_;
         received_.clear();
     }
 
