@@ -94,25 +94,32 @@ Listener::Event Listener::advance(int64_t t) {
 
 // ---------------------------------------------------------------------------------------------- slave
 Slave::Slave(const asi_slave_cfg &cfg, uint64_t seed, int64_t now, bool power)
-    : inputs(cfg.inputs & 0xF), io_(cfg.io & 0xF), id_(cfg.id & 0xF), id2_(cfg.id2 & 0xF),
-      watchdog_(cfg.watchdog != 0), present_(cfg.present != 0), power_(power), id1_(cfg.id1 & 0xF),
+    : inputs(cfg.inputs & 0xF), transaction(Transaction::make(cfg.io & 0xF, cfg.id & 0xF, cfg.id2 & 0xF)),
+      io_(cfg.io & 0xF), id_(cfg.id & 0xF), id2_(cfg.id2 & 0xF),
+      watchdog_(cfg.watchdog != 0), present_(cfg.present != 0), power_(power), id1_(cfg.id1 & 0xF), stored_id1_(id1_),
       number_(cfg.address & 31), stored_number_(number_), random_(mix(seed)) {
     // the address says which Sel an A/B slave has; at address 0 only ID1 can
-    if (id_ == 0xA && cfg.address) id1_ = static_cast<uint8_t>((id1_ & 7) | (cfg.address >> 5) << 3);
+    if (id_ == 0xA && cfg.address) stored_id1_ = static_cast<uint8_t>((id1_ & 7) | (cfg.address >> 5) << 3);
     restart(now, kPowerUpTime);
 }
 
 void Slave::restart(int64_t now, int64_t silent) {
     number_ = stored_number_;  // DELA is volatile
+    id1_ = stored_id1_;
     outputs_ = parameter_ = 0xF;
     dexg_disabled_ = true;
     synchronous_ = false;
     ready_at_ = now + silent;
     watchdog_at_ = watchdog_ ? ready_at_ + kWatchdogTime : kNever;
+    if (transaction) transaction->reset();
 }
 
 void Slave::catch_up(int64_t now) {
-    if (writing_ && now >= write_end_) writing_ = corrupt_ = false;
+    if (writing_ && now >= write_end_) {
+        writing_ = false;
+        write_failed_ = write_fails_;
+        if (!write_failed_) corrupt_ = false;
+    }
     // a running write keeps the watchdog from biting, not from running out; a slave that nobody serves is reset again
     // and again
     if (!alive() || number_ == 0 || watchdog_at_ == kNever) return;
@@ -148,19 +155,23 @@ bool Slave::hears(int64_t first, bool synchronous) const {
     return alive() && synchronous_ == synchronous && first >= ready_at_;
 }
 
-unsigned Slave::status() const { return writing_ | (periphery_fault != 0) << 1 | corrupt_ << 3; }
-
-void Slave::write_memory(int64_t now) {
-    stored_number_ = number_;
-    writing_ = true;
-    write_end_ = now + kWriteTime;
+unsigned Slave::status() const {
+    return writing_ | (periphery_fault != 0) << 1 | (corrupt_ || write_failed_) << 3;
 }
 
-unsigned Slave::data_exchange(unsigned data) {
+void Slave::write_memory(uint8_t &stored, uint8_t value, int64_t now) {
+    write_fails_ = options.write_fails;
+    if (!write_fails_) stored = value;  // else the old content stays
+    writing_ = true;
+    write_end_ = now + options.write_ns;
+}
+
+unsigned Slave::data_exchange(unsigned data, int64_t t) {
     const unsigned payload = extended() ? 7 : 15;  // D3 of an A/B slave is an input; its register keeps 1
     outputs_ = static_cast<uint8_t>((data & payload) | (0xF & ~payload));
     const unsigned echo = kOutputBits[io()] & payload;
-    return (outputs_ & echo) | (inputs & ~echo & 0xF);
+    const unsigned plain = (outputs_ & echo) | (inputs & ~echo & 0xF);
+    return transaction ? transaction->exchange(data, plain, t) : plain;
 }
 
 bool Slave::request(unsigned call, int64_t now, int64_t last, unsigned &answer) {
@@ -173,13 +184,12 @@ bool Slave::request(unsigned call, int64_t now, int64_t last, unsigned &answer) 
         return false;
     }
     if (number != number_) return false;
-    const bool mine = i3 == (extended() && sel());   // I3 carries Sel
-    const bool mine_inv = i3 != (extended() && sel());  // I3 carries ~Sel
+    const bool mine = i3 == (sel() != 0), mine_inv = !mine;  // I3 carries Sel; ~Sel
     if (!control && number == 0) {                   // ADRA
         requests_++;
         number_ = static_cast<uint8_t>(info);
         if (watchdog_) watchdog_at_ = now + kWatchdogTime;  // time at address 0 does not count
-        write_memory(now);
+        write_memory(stored_number_, number_, now);
         answer = kAck;
     } else if (!control) {                           // DEXG, WPAR
         if (extended() && !mine_inv) return false;
@@ -187,19 +197,19 @@ bool Slave::request(unsigned call, int64_t now, int64_t last, unsigned &answer) 
         if (i4) {
             parameter_ = static_cast<uint8_t>(extended() ? 8 | low : info & 15);
             dexg_disabled_ = false;
+            if (transaction) transaction->parameter(parameter_);
             answer = parameter_;
         } else {
             if (dexg_disabled_) return false;
-            answer = data_exchange(info & 15);
+            answer = data_exchange(info & 15, last);
         }
         if (watchdog_) watchdog_at_ = now + kWatchdogTime;
     } else if (!i4) {
         if (number == 0) {                           // WID1
+            if (options.id1_locked && ((info ^ id1_) & 7)) return false;
             requests_++;
             id1_ = static_cast<uint8_t>(info & 15);
-            const uint8_t keep = stored_number_;
-            write_memory(now);
-            stored_number_ = keep;                   // only ID1 is written; DELA stays volatile
+            write_memory(stored_id1_, id1_, now);    // only ID1 is written; DELA stays volatile
             answer = kDone;
         } else {                                     // DELA
             if (low != 0 || !mine) return false;
@@ -210,7 +220,7 @@ bool Slave::request(unsigned call, int64_t now, int64_t last, unsigned &answer) 
     } else {
         switch (low) {
             case kReadIo: case kReadId: case kReadId1: case kReadId2:
-                if (!mine) return false;
+                if (!mine || (options.old && low >= kReadId1)) return false;
                 answer = low == kReadIo ? io() : low == kReadId ? id() : low == kReadId1 ? id1_ : id2_;
                 break;
             case kReset:
@@ -246,7 +256,7 @@ void Slave::answer_pulses(unsigned nibble, int64_t t, std::vector<Pulse> &out) {
 }
 
 void Slave::state(asi_slave_state &out) const {
-    out.address = static_cast<uint8_t>(number_ + (number_ && extended() && sel() ? 32 : 0));
+    out.address = static_cast<uint8_t>(number_ + (number_ && sel() ? 32 : 0));
     out.outputs = outputs_;
     out.parameter = parameter_;
     out.dexg_disabled = dexg_disabled_;
@@ -347,6 +357,10 @@ Slave *find(asi_net *net, int slave) {
     return net && slave >= 0 && static_cast<size_t>(slave) < net->slaves.size()
                ? &net->slaves[static_cast<size_t>(slave)] : nullptr;
 }
+Slave *transacting(asi_net *net, int slave) {  // only slaves that are more than plain nibbles
+    Slave *s = find(net, slave);
+    return s && s->transaction ? s : nullptr;
+}
 constexpr int kBad = -1;
 }  // namespace
 
@@ -388,6 +402,47 @@ int asi_net_set_faults(asi_net *net, int slave, const asi_slave_faults *faults) 
     if (!s || !faults) return kBad;
     s->faults = *faults;
     return 0;
+}
+
+int asi_net_set_options(asi_net *net, int slave, const asi_slave_options *options) {
+    Slave *s = find(net, slave);
+    if (!s || !options || options->write_ns < 0) return kBad;
+    s->options = *options;
+    return 0;
+}
+
+int asi_net_set_value(asi_net *net, int slave, int channel, uint16_t value) {
+    Slave *s = transacting(net, slave);
+    return s && channel >= 0 && s->transaction->set_value(static_cast<unsigned>(channel), value) ? 0 : kBad;
+}
+
+int asi_net_set_invalid(asi_net *net, int slave, uint8_t v0, uint8_t overflow) {
+    Slave *s = transacting(net, slave);
+    return s && s->transaction->set_invalid(v0, overflow) ? 0 : kBad;
+}
+
+int asi_net_get_value(const asi_net *net, int slave, int channel, uint16_t *value) {
+    Slave *s = transacting(const_cast<asi_net *>(net), slave);
+    if (!s || channel < 0 || !value) return kBad;
+    s->catch_up(net->now);
+    return s->transaction->value(static_cast<unsigned>(channel), net->now, *value);
+}
+
+int asi_net_set_string(asi_net *net, int slave, int kind, const uint8_t *bytes, int n) {
+    Slave *s = transacting(net, slave);
+    if (!s || kind < 0 || n < 0 || (n > 0 && !bytes)) return kBad;
+    return s->transaction->set_string(static_cast<unsigned>(kind), bytes, static_cast<unsigned>(n)) ? 0 : kBad;
+}
+
+int asi_net_get_string(const asi_net *net, int slave, int kind, uint8_t *bytes, int max) {
+    const Slave *s = transacting(const_cast<asi_net *>(net), slave);
+    if (!s || kind < 0 || max < 0 || (max > 0 && !bytes)) return kBad;
+    return s->transaction->string(static_cast<unsigned>(kind), bytes, static_cast<unsigned>(max));
+}
+
+int asi_net_set_safety(asi_net *net, int slave, const uint8_t table[8], uint8_t closed) {
+    Slave *s = transacting(net, slave);
+    return s && table && s->transaction->set_safety(table, closed) ? 0 : kBad;
 }
 
 int asi_net_get(const asi_net *net, int slave, asi_slave_state *state) {

@@ -7,14 +7,16 @@
 // Slaves do not listen to each other's answers, nor to injected pulses.
 //
 // A slave's own timers (reset, power-up, watchdog, non-volatile write) are looked at when something happens to it.
-// Requirements: SL-001..SL-006, SL-008 (docs/requirements.md).
+// Requirements: SL-001..SL-006, SL-008..SL-010 (docs/requirements.md).
 #pragma once
 #include <array>
 #include <cstdint>
 #include <deque>
 #include <limits>
+#include <memory>
 #include <vector>
 
+#include "asi_ctt_slave.h"
 #include "asi_line.h"
 #include "asi_monitor.h"
 #include "asi_tb.h"
@@ -26,7 +28,7 @@ constexpr int64_t kQuietSync = 6'000, kQuietAsync = 18'000;     // silence after
 constexpr int64_t kAnswerSync = 21'500, kAnswerAsync = 33'500;  // last request pulse to first answer pulse
 constexpr int64_t kResetTime = 1'000'000;                       // not answering after RES, BR01 or the watchdog
 constexpr int64_t kPowerUpTime = 10'000'000;                    // not answering after power-up
-constexpr int64_t kWriteTime = 15'000'000;                      // non-volatile write after ADRA or WID1
+constexpr int64_t kWriteTime = 15'000'000;                      // non-volatile write after ADRA or WID1, by default
 constexpr int64_t kWatchdogTime = 94'200'000;
 
 // xorshift64*: small, and the same on every machine.
@@ -87,29 +89,32 @@ public:
 
     uint8_t inputs, periphery_fault = 0;
     asi_slave_faults faults{};
+    asi_slave_options options{kWriteTime, 0, 0, 0, 0};
+    std::unique_ptr<Transaction> transaction;  // null: plain nibbles
 
 private:
     bool extended() const { return id() == 0xA; }
     bool alive() const { return present_ && power_; }
-    unsigned sel() const { return id1_ >> 3; }
+    // Sel it obeys: A/B slaves only; at address 0 an option
+    unsigned sel() const { return extended() && (number_ || options.sel_at_zero) ? id1_ >> 3 : 0; }
     unsigned io() const { return corrupt_ ? 0xF : io_; }
     unsigned id() const { return corrupt_ ? 0xF : id_; }
     unsigned status() const;
-    unsigned data_exchange(unsigned data);
-    void write_memory(int64_t now);
+    unsigned data_exchange(unsigned data, int64_t t);
+    void write_memory(uint8_t &stored, uint8_t value, int64_t now);
     void power_down(int64_t now);
     void restart(int64_t now, int64_t silent);
 
     const uint8_t io_, id_, id2_;
     const bool watchdog_;
     bool present_, power_;
-    uint8_t id1_;                    // bit 3 is Sel of an A/B slave
+    uint8_t id1_, stored_id1_;       // bit 3 is Sel of an A/B slave; non-volatile copy
     uint8_t number_, stored_number_; // working address; non-volatile copy
     uint8_t outputs_ = 0xF, parameter_ = 0xF;
     bool dexg_disabled_ = true, synchronous_ = false, corrupt_ = false;
     int64_t ready_at_ = 0;           // deaf before
     int64_t write_end_ = 0;          // a non-volatile write runs until then
-    bool writing_ = false;
+    bool writing_ = false, write_fails_ = false, write_failed_ = false;  // fails: the one that runs; failed: the last
     int64_t watchdog_at_ = kNever;
     uint32_t requests_ = 0, answers_ = 0;
     Random random_;

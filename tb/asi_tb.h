@@ -50,20 +50,26 @@ int      asi_net_get(const asi_net *net, int slave, asi_slave_state *state);
 /* options of one slave (SL-010); all 0 but write_ns = 15 ms by default */
 typedef struct {
     int64_t write_ns;     /* time of a memory write after ADRA or WID1 */
-    uint8_t write_fails;  /* 1: the write ends with S3 = 1 and the old content */
+    uint8_t write_fails;  /* 1: a write that begins now ends with S3 = 1 and the old content in the memory; the new
+                             address or ID1 works until the next reset. S3 stays until a write goes well */
     uint8_t id1_locked;   /* 1: WID1 that changes the low three bits of ID1 is not answered */
     uint8_t old;          /* 1: RID1 and RID2 are not answered */
     uint8_t sel_at_zero;  /* 1: at address 0 an A/B slave obeys the select of its ID1 bit 3; 0: it obeys Sel = 0 */
 } asi_slave_options;
 int      asi_net_set_options(asi_net *net, int slave, const asi_slave_options *options);
-/* combined transactions (SL-009): the slave's kind follows from its codes, as in CT-001. Channels 0..3 */
-int      asi_net_set_value(asi_net *net, int slave, int channel, uint16_t value);     /* input word of the slave */
-int      asi_net_set_invalid(asi_net *net, int slave, uint8_t v0, uint8_t overflow);  /* bit per channel: sends V = 0, O = 1 */
-int      asi_net_get_value(const asi_net *net, int slave, int channel, uint16_t *value);  /* output word received; 0: none yet */
-int      asi_net_set_string(asi_net *net, int slave, int kind, const uint8_t *bytes, int n);  /* 0 ID, 1 diagnosis, 2 parameters;
-                                                                                     CTT2: 0 ID object, 1.. object of that index */
-int      asi_net_get_string(const asi_net *net, int slave, int kind, uint8_t *bytes, int max);
-int      asi_net_set_safety(asi_net *net, int slave, const uint8_t table[8], uint8_t closed);  /* closed: bits 0, 1 = channel 1, 2 */
+/* Combined transactions (SL-009): the slave's kind follows from its codes, as in CT-001. Plain slaves, and kinds that
+   have no such thing, refuse. Channels 0..3. CTT1: 16-bit values. CTT2: words of the cyclic images (an image of a byte:
+   low byte of word 0); DI0, DI1 come from set_inputs. S-7.A.7: outputs in channel 0, inputs come from set_inputs.
+   S-7.A.A: bytes in channel 0. Digital outputs are at host level. */
+int      asi_net_set_value(asi_net *net, int slave, int channel, uint16_t value);  /* input word of the slave */
+int      asi_net_set_invalid(asi_net *net, int slave, uint8_t v0, uint8_t overflow);  /* bits: V = 0; O = 1 */
+int      asi_net_get_value(const asi_net *net, int slave, int channel, uint16_t *value);  /* output; 1, none (yet): 0 */
+/* Strings. CTT1: kind 0 ID, 1 diagnosis, 2 parameters, in sequences of 3 bytes; the slave sets F and V itself, an empty
+   string goes out as V = 0. CTT2: kind = index of an object, 0 = ID object, which also says how long the images are */
+int      asi_net_set_string(asi_net *net, int slave, int kind, const uint8_t *bytes, int n);
+int      asi_net_get_string(const asi_net *net, int slave, int kind, uint8_t *bytes, int max);  /* -> length <= max */
+/* closed: bits 0, 1 = channels 1, 2. Before: 0001 0101 0110 1001 1110 1011 1100 0111, both closed */
+int      asi_net_set_safety(asi_net *net, int slave, const uint8_t table[8], uint8_t closed);
 int      asi_net_power(asi_net *net, uint8_t good);                            /* 0: all slaves lose power */
 /* without a chip: a pulse of the master; then advance to t_ns and collect the slaves' pulses that start until then */
 int      asi_net_master_pulse(asi_net *net, int64_t t_ns, int32_t polarity);

@@ -6,9 +6,9 @@
 #   build/tb/libasi_line_rx.so      the receivers alone, behind comparator levels, for the analog line model (sim/line)
 TB_OUT     := $(BUILD)/tb
 TB_CXX     ?= $(CXX)
-TB_FLAGS   := -std=c++20 -O3 -fPIC -Wall -Wextra -Werror
-TB_HEADERS := $(wildcard tb/*.h) tb/tb.mk
-TB_SLAVES  := tb/asi_slaves.cpp tb/asi_monitor.cpp tb/asi_flash.cpp
+TB_FLAGS   := -std=c++20 -O3 -fPIC -Wall -Wextra -Werror -Ifirmware/generated
+TB_HEADERS := $(wildcard tb/*.h) firmware/generated/asi_ctt_table.h tb/tb.mk
+TB_SLAVES  := tb/asi_slaves.cpp tb/asi_ctt_slave.cpp tb/asi_monitor.cpp tb/asi_flash.cpp
 ASI_CLK_HZ ?= 16000000
 
 $(TB_OUT)/libasi_slaves.so: $(TB_SLAVES) $(TB_HEADERS)

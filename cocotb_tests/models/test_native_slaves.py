@@ -319,7 +319,7 @@ def test_power_fail_while_writing():
 def test_write_id1():
     """SL-005: WID1 at address 0 answers 0 and stores ID1; for an A/B slave bit 3 is Sel, also of its next address."""
     line = Line()
-    s = line.net.add(5, io=7, **AB)
+    s = line.net.add(5, io=7, sel_at_zero=True, **AB)
     assert line.call("WID1", data=0xF) is None
     line.call("DELA", 5)
     assert line.call("WID1", data=0xF) == 0
@@ -329,6 +329,97 @@ def test_write_id1():
     assert line.call("ADRA", data=9) == 6
     assert line.net.state(s).address == 9 + 32
     assert line.call("RDIO", 9 + 32) == 7
+
+
+def test_select_at_address_0():
+    """SL-010, CA-004: at address 0 an A/B slave obeys Sel = 0, or as an option its own Sel; ADRA and WID1 have none."""
+    for own, id1, sel in ((False, 7, 0), (False, 0xF, 0), (True, 7, 0), (True, 0xF, 1)):
+        line = Line()
+        s = line.net.add(0, io=7, id=0xA, id1=id1, id2=0xE, sel_at_zero=own)
+        for name, answer in (("RDIO", 7), ("RDID", 0xA), ("RID1", id1), ("RID2", 0xE), ("RDST", 0)):
+            assert line.call(name, 32 * sel) == answer
+            assert line.call(name, 32 - 32 * sel) is None
+        assert line.call("ADRA", data=4) == 6
+        assert line.net.state(s).address == (36 if id1 == 0xF else 4)
+    with pytest.raises(NativeError):
+        line.net.set_options(s, write_ns=-1)
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_change_of_an_ab_address(own):
+    """SL-010, SL-005: 5B becomes 9A in the order of an address change, whichever Sel the slave obeys at address 0."""
+    line = Line()
+    s = line.net.add(37, io=7, id=0xA, id2=0xE, sel_at_zero=own, write_ns=40 * MS)
+    at_zero = 32 if own else 0
+    assert line.call("DELA", 37) == 0
+    assert line.call("RID1", at_zero) == 0xF
+    assert line.call("WID1", data=7) == 0
+    assert line.call("RID1", 32) is None and line.call("RDST", 0) == 1
+    line.wait(39 * MS)
+    assert line.call("RDST", 0) == 1
+    line.wait(1 * MS)
+    assert (line.call("RDST", 0), line.call("RID1", 0)) == (0, 7)
+    assert line.call("ADRA", data=9) == 6
+    assert line.call("RDST", 9) == 1
+    line.wait(40 * MS)
+    assert (line.call("RDST", 9), line.call("RID1", 9), line.call("RDIO", 9 + 32)) == (0, 7, None)
+    assert line.net.state(s).address == 9
+
+
+def test_write_time():
+    """SL-010: S0 is 1 exactly as long as the write takes that the slave was given."""
+    for write_ns in (0, 1 * MS, 500 * MS):
+        line = Line()
+        line.net.add(0, io=7, write_ns=write_ns)
+        line.call("RDIO", 0)
+        accepted = line.t + (78 + 7.5) * US
+        assert line.call("ADRA", data=12) == 6
+        if write_ns:
+            line.t = int(accepted) + write_ns - 86 * US
+            assert line.call("RDST", 12) == 1
+        assert line.call("RDST", 12) == 0
+
+
+def test_write_that_fails():
+    """SL-010: the write ends with S3 = 1; the new address works until power fails, then the old one is back; a good
+    write clears S3."""
+    line = Line()
+    s = line.net.add(5, io=7, id=1, id1=3, write_fails=True)
+    line.call("DELA", 5)
+    assert line.call("WID1", data=6) == 0
+    assert (line.call("RDST", 0), line.call("RID1", 0)) == (1, 6)
+    line.wait(15 * MS)
+    assert line.call("RDST", 0) == 8
+    assert line.call("ADRA", data=12) == 6
+    assert line.call("RDST", 12) == 9
+    line.wait(15 * MS)
+    assert [line.call(name, 12) for name in ("RDST", "RDIO", "RDID", "RID1")] == [8, 7, 1, 6]
+    line.net.power(False)
+    line.net.power(True)
+    line.wait(READY)
+    assert [line.call(name, 5) for name in ("RDST", "RDIO", "RDID", "RID1")] == [8, 7, 1, 3]
+    line.net.set_options(s)
+    line.call("DELA", 5)
+    line.call("ADRA", data=12)
+    line.wait(15 * MS)
+    assert line.call("RDST", 12) == 0
+
+
+def test_protected_id1():
+    """SL-010: WID1 that changes the low three bits is neither answered nor done, one that changes Sel is."""
+    line = Line()
+    line.net.add(0, io=7, id1_locked=True, **AB)
+    assert line.call("WID1", data=6) is None
+    assert (line.call("RDST", 0), line.call("RID1", 0)) == (0, 7)
+    assert line.call("WID1", data=0xF) == 0
+    assert (line.call("RDST", 0), line.call("RID1", 0)) == (1, 0xF)
+
+
+def test_slave_without_extended_codes():
+    """SL-010: a slave older than 2.1 answers everything but RID1 and RID2."""
+    line = Line()
+    line.net.add(5, io=7, id=1, old=True)
+    assert [line.call(name, 5) for name in ("RDIO", "RDID", "RID1", "RID2", "RDST", "WPAR")] == [7, 1, None, None, 0, 0]
 
 
 def test_write_id1_is_not_an_address():

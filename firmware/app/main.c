@@ -5,6 +5,7 @@
 #include "asi_hw.h"
 #include "asi_persist.h"
 #include "asi_window.h"
+#include "hal_vexriscv.h"
 
 static asi_ec_t ec;
 static uint32_t last_us;
@@ -50,6 +51,18 @@ void asi_interrupt(void)
     hal_leave_time();
 }
 
+/** Permanent data, step by step; the log tells how it ended. */
+static void serve_storage(void)
+{
+    asi_status_t result;
+    asi_persist_serve();
+    if (!asi_persist_ended(&result))
+        return;
+    hal_irq_off();
+    asi_log_put(&ec.log, asi_port_time_us(), ASI_EVENT_STORED, 0u, (unsigned)-result);
+    hal_irq_on();
+}
+
 int main(void)
 {
     hal_init();
@@ -65,7 +78,7 @@ int main(void)
         while (asi_window_serve(&ec)) {
         }
         asi_diag_serve(&ec);
-        asi_persist_serve();
+        serve_storage();
         hal_sleep();
     }
 }

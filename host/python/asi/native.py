@@ -15,6 +15,8 @@ from cffi import FFI
 _ROOT = Path(__file__).resolve().parents[3]
 _BULK = 4096  # records fetched per call
 CERTAIN = 0xFFFF  # probability of a fault: always
+WRITE_NS = 15_000_000  # memory write of a slave unless set otherwise
+STRING_ID, STRING_DIAGNOSIS, STRING_PARAMETERS = range(3)  # strings of CTT1
 
 
 class NativeError(RuntimeError):
@@ -128,11 +130,20 @@ class Net:
             self._ffi, self._lib = load("asi_slaves")
             self._net = self._ffi.gc(self._lib.asi_net_new(seed), self._lib.asi_net_free)
 
-    def add(self, address, io=0, id=0xF, id1=0xF, id2=0xF, inputs=0, watchdog=False, present=True):
-        """-> slave handle. address: index 0, 1..31, 33..63 (B: only with id = 0xA)."""
+    def add(self, address, io=0, id=0xF, id1=0xF, id2=0xF, inputs=0, watchdog=False, present=True, **options):
+        """-> slave handle. address: index 0, 1..31, 33..63 (B: only with id = 0xA). options: as set_options."""
         cfg = self._ffi.new("asi_slave_cfg *", dict(
             address=address, io=io, id=id, id1=id1, id2=id2, inputs=inputs, watchdog=watchdog, present=present))
-        return _check(self._lib.asi_net_add(self._net, cfg), f"slave at index {address}")
+        slave = _check(self._lib.asi_net_add(self._net, cfg), f"slave at index {address}")
+        if options:
+            self.set_options(slave, **options)
+        return slave
+
+    def set_options(self, slave, write_ns=WRITE_NS, **flags):
+        """SL-010: write_ns, time of a memory write; write_fails, id1_locked, old, sel_at_zero: what is not named is
+        off (meaning: asi_slave_options in tb/asi_tb.h)."""
+        options = self._ffi.new("asi_slave_options *", dict(flags, write_ns=write_ns))
+        _check(self._lib.asi_net_set_options(self._net, slave, options), f"options of slave {slave}")
 
     def set_inputs(self, slave, inputs):
         """inputs: nibble, line level."""
@@ -150,6 +161,40 @@ class Net:
         shift_ns, delay_ns; what is not named is off."""
         _check(self._lib.asi_net_set_faults(self._net, slave, self._ffi.new("asi_slave_faults *", faults)),
                f"slave {slave}")
+
+    # combined transactions (SL-009): refused when the slave's codes ask for no such thing
+    def set_value(self, slave, channel, value):
+        """Input value of a channel, 16 bit (S-7.A.A: 8 bit)."""
+        _check(self._lib.asi_net_set_value(self._net, slave, channel, value), f"value {channel} of slave {slave}")
+
+    def set_invalid(self, slave, invalid=0, overflow=0):
+        """CTT1 inputs, a bit per channel: values are sent with V = 0, with O = 1."""
+        _check(self._lib.asi_net_set_invalid(self._net, slave, invalid, overflow), f"validity of slave {slave}")
+
+    def value(self, slave, channel=0):
+        """-> output value the slave has received, None when there is none (yet)."""
+        out = self._ffi.new("uint16_t *")
+        known = _check(self._lib.asi_net_get_value(self._net, slave, channel, out), f"value {channel} of slave {slave}")
+        return out[0] if known else None
+
+    def set_string(self, slave, kind, data):
+        """CTT1: kind STRING_ID, STRING_DIAGNOSIS or STRING_PARAMETERS, sequences of 3 bytes, F and V are added;
+        CTT2: kind = index of the object, 0 = ID object."""
+        _check(self._lib.asi_net_set_string(self._net, slave, kind, bytes(data), len(data)),
+               f"string {kind} of slave {slave}")
+
+    def string(self, slave, kind):
+        """-> bytes: what set_string or the master has written."""
+        out = self._ffi.new("uint8_t[256]")
+        length = _check(self._lib.asi_net_get_string(self._net, slave, kind, out, 256),
+                        f"string {kind} of slave {slave}")
+        return bytes(self._ffi.buffer(out, length))
+
+    def set_safety(self, slave, table, closed=3):
+        """Safety slave: 8 words; closed: bits 0, 1 = channels 1, 2."""
+        if len(table) != 8:
+            raise NativeError(f"safety table of slave {slave}: 8 words, not {len(table)}")
+        _check(self._lib.asi_net_set_safety(self._net, slave, bytes(table), closed), f"safety table of slave {slave}")
 
     def state(self, slave):
         """-> SlaveState now."""
