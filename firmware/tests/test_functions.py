@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Execution control functions that need no telegram, one by one, with what they refuse."""
 import pytest
-from fake_line import DATA_EXCHANGE, OFFLINE, Master, PeripheralSlave, Slave, mask
+from fake_line import ACTIVATION, DATA_EXCHANGE, OFFLINE, Master, PeripheralSlave, Slave, mask
 
 BAD_ARG, PROTECTED, SLAVE0 = -1, -5, -6
 NOBODY = (0, 32, 64, 200)
@@ -72,7 +72,7 @@ def test_store_actual_configuration():
     lps, pcd, pp, _ = m.permanent()
     assert lps == {1, 4, 36} and pcd == m.read()["cdi"] and pcd[9] == slaves[3].codes
     assert pp == [{4: 5}.get(i, 15) for i in range(64)] and m.read()["permanent_version"] == stored + 1
-    slaves.pop()
+    m.slaves.pop()
     m.until(lambda s: s["flags"] >= {"config_ok"})
     m.protect()
     m.until(lambda s: s["phase"] == DATA_EXCHANGE)
@@ -162,6 +162,7 @@ def test_auto_address_control():
     assert not m.controls()["auto_address"] and m.read()["permanent_version"] == stored + 2
 
 
+@pytest.mark.xfail(strict=True, reason="asi_inclusion.c restarts the cycle that ec_reactivate has stopped")
 def test_data_exchange_back_during_an_inclusion():
     """EX-024, FN-019, EX-013: the slave that is included in the last cycle before the new activation does not stop it."""
     for moment in range(1, 12):
@@ -175,7 +176,6 @@ def test_data_exchange_back_during_an_inclusion():
         for s in m.slaves:
             s.power_up()  # both need WPAR again
         m.set_data_exchange(True)
-        for _ in range(3):
-            m.step()
+        m.until(lambda s: s["phase"] == ACTIVATION, steps=4)
         m.until(lambda s: s["las"] == {1, 9} and s["in"][1] == 5 and s["in"][9] == 6, steps=200)
         assert m.port.violations == 0, moment
