@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Execution control, rule by rule: the core over a fake sequencer with simulated slaves."""
 import pytest
-from fake_line import ACTIVATION, DATA_EXCHANGE, DETECTION, OFFLINE, SETTLE_US, Master, Slave, projection
+from fake_line import (ACTIVATION, DATA_EXCHANGE, DETECTION, OFFLINE, SETTLE_US, Master, PeripheralSlave, Slave,
+                       name_of, projection)
 
 from asi.telegram import encode_call
 
-BAD_ARG, BAD_STATE, BUSY, ABORTED = -1, -2, -3, -4
+BAD_ARG, BAD_STATE = -1, -2
+SLAVE0, AUTO_CLEAR, AUTO_CLEAR_MODE = -6, -19, -20
 
 
 def std(index, **kw):
@@ -252,21 +254,17 @@ def test_detection_and_activation_retries():
         assert m.names().count(("RDIO", 4)) == 3 and m.slaves[1].heard["RDIO"] == 3
 
 
-def test_management_retries():
-    """EX-010: a management call has two repetitions in its slot and brings its own result."""
-    m = Master([std(1), std(4)]).start()
-    result = m.ffi.new("fw_result *")
-    assert m.lib.fw_manage_result(result) == BAD_STATE
-    m.slaves[1].deaf = 0
-    rdid = encode_call("RDID", 4)
-    for noise, answer in ((False, 0), (True, 1)):
-        m.slaves[1].present = not noise
-        assert m.lib.fw_manage(rdid) == 0 and m.lib.fw_manage(rdid) == BUSY
-        assert m.lib.fw_manage_result(result) == BUSY
-        start = len(m.log)
-        m.cycles(2)
-        assert m.lib.fw_manage_result(result) == 0 and result.error == answer
-        assert [c for c, _, _ in m.log[start:]].count(rdid) == (3 if noise else 1)
+def test_poll_retries():
+    """EX-010, EX-027: a status poll has two repetitions in its slot; without any answer LPF stays as it is."""
+    m = Master([PeripheralSlave(4, fault=True)]).start()
+    m.until(lambda s: s["lpf"] == {4})
+    m.slaves[0].fault, m.slaves[0].mute = False, frozenset({"RDST"})
+    start = len(m.log)
+    m.cycles(9)
+    polls = [e for c, e, _ in m.log[start:] if name_of(c)[0] == "RDST"]
+    assert polls == [1] * 9 and m.read()["lpf"] == {4} and m.read()["las"] == {4}
+    m.slaves[0].mute = frozenset()
+    m.until(lambda s: not s["lpf"], steps=6)
 
 
 # ------------------------------------------------------------------------------------------ normal operation, inclusion
@@ -286,11 +284,14 @@ def test_probe_order():
     """EX-012: one probe a cycle, to every address not in LAS, 0 included, Sel = 0 then Sel = 1, wrapping; never 32."""
     m = Master([std(1), ab(5), ab(37)]).start()
     start = len(m.log)
-    m.cycles(2 * 60)
+    m.probes(2 * 60)
     probes = [i for n, i in m.names(start) if n == "RDIO"]
     candidates = [i for i in range(64) if i not in (1, 5, 37, 32)]
     assert probes == candidates * 2
-    assert len(m.log) - start == 2 * 60 + 2 * 60 * 2  # 5 and 5B take turns
+    cycles = m.cycle_number
+    assert len(m.log) - start == cycles * 3  # 1, 5 and 5B in turns, and one extra call
+    polls = [n for n in map(name_of, (c for c, _, _ in m.log[start:])) if n[0] == "RDST"]
+    assert len(polls) == cycles // 3 and polls[:4] == [("RDST", i) for i in (1, 5, 37, 1)]
 
 
 def test_inclusion_one_call_per_slot():
@@ -350,7 +351,7 @@ def test_inclusion_retries(name):
 def test_inclusion_gives_up():
     """EX-010, EX-013: after the third failure the search goes on; an A/B slave without RID1 is not taken."""
     m = Master([std(1), ab(9, mute=frozenset({"RID1"}))]).start()
-    m.cycles(62 + 4)  # one round, and RDID and three times RID1
+    m.probes(62 + 4)  # one round, and RDID and three times RID1
     assert m.read()["lds"] == {1} and m.slaves[1].heard["RID1"] == 6  # three in detection, three in the round
 
 
@@ -361,9 +362,9 @@ def test_missed_rounds():
     while [n for n in m.names()[-2:] if n == ("RID2", 0)] == []:
         m.cycles(1)
     m.slaves[1].present = False
-    m.cycles(2 * 62)
+    m.probes(2 * 62)
     assert m.read()["lds"] == {0, 1} and "lds0" in m.read()["flags"]
-    m.cycles(62)
+    m.probes(62)
     assert m.read()["lds"] == {1} and "lds0" not in m.read()["flags"] and m.read()["cdi"][0] == 0xFFFF
 
 
@@ -372,10 +373,10 @@ def test_miss_counter_starts_over():
     m = Master([std(1), std(0)]).start()
     for _ in range(4):
         m.slaves[1].present = False
-        m.cycles(2 * 62)
+        m.probes(2 * 62)
         assert m.read()["lds"] == {0, 1}
         m.slaves[1].present = True
-        m.cycles(62 + 3)
+        m.probes(62 + 3)
         assert m.read()["lds"] == {0, 1}
 
 
@@ -501,20 +502,20 @@ def test_mode_change_passes_offline():
 
 # ------------------------------------------------------------------------------------------ data, functions, clash
 def test_outputs():
-    """CA-005, EX-024: payload inverted, A/B slaves in three bits; idle addresses F; data exchange off: all F."""
+    """CA-005, LK-006: payload inverted, A/B slaves in three bits; idle addresses F; one cycle later on the line."""
     m = Master([std(1), ab(2), ab(34)])
     m.host_outputs = [15] * 64
     m.host_outputs[1], m.host_outputs[2], m.host_outputs[34] = 0b0110, 0b1101, 0b0011
-    m.start().cycles(3)
+    m.start().cycles(4)
     assert [s.outputs for s in m.slaves] == [0b1001, 0b010, 0b100]
     assert m.port.out[0] >> 8 & 15 == 0b1010  # bit 3 is no payload: not inverted
     assert m.port.out[0] >> 12 == 0xFFFFF and list(m.port.out)[5:] == [0xFFFFFFFF] * 3
-    m.set_data_exchange(False)
-    m.cycles(3)
-    assert [s.outputs for s in m.slaves] == [15, 7, 7] and list(m.port.out) == [0xFFFFFFFF] * 8
-    m.set_data_exchange(True)
-    m.cycles(2)
+    m.host_outputs[1] = 0
+    m.cycles(1)  # its report brings the new value; the next cycle has begun with the old one
+    m.cycles(1)
     assert m.slaves[0].outputs == 0b1001
+    m.cycles(1)
+    assert m.slaves[0].outputs == 15
 
 
 def test_default_outputs():
@@ -528,39 +529,36 @@ def test_default_outputs():
 
 
 def test_refused_functions_change_nothing():
-    """EX-025: a bad projection and forbidden or untimely management calls are refused, and nothing changes."""
-    m = Master([std(1)], projected=[std(1)])
-    assert m.lib.fw_manage(encode_call("RDID", 1)) == BAD_STATE
-    m.start()
-    before = m.read()
+    """EX-025: bad projections, controls and reports that do not fit are refused, and nothing changes."""
+    m = Master([std(1)], projected=[std(1)]).start()
+    before, controls = m.read(), m.controls()
     for bad in (0, 32):
         lps, pcd, pp = projection([std(1)])
         lps[bad >> 5] |= 1 << (bad & 31)
         assert m.lib.fw_set_projection(lps, pcd, pp) == BAD_ARG
     lps, pcd, pp = projection()
     assert m.lib.fw_set_projection(lps, pcd, [*pp[:63], 16]) == BAD_ARG
-    for name in ("ADRA", "WID1", "DELA", "BR01", "PRGM", "R1", "DEXG"):
-        assert m.lib.fw_manage(encode_call(name, 1, 5)) == BAD_ARG, name
+    assert m.control(auto_clear=4, protected_mode=True) == BAD_ARG
     assert m.lose([2, 0, 32]) == m.lose([]) == BAD_STATE
     assert m.lib.fw_batch_done([(0, 0, 0)], 1) == BAD_STATE
-    assert m.read() == before and m.port.managements == 0
+    assert m.read() == before and m.controls() == controls and m.port.managements == 0
     m.set_offline(True)
     assert m.lib.fw_cycle_done((0, 0, 0), (0, 0, 0), [0xFFFFFFFF] * 8) == BAD_STATE
     assert m.read()["in"] == [0] * 64
 
 
-def test_management_aborted():
-    """EX-025, EX-021: an open management call ends as aborted when the line goes offline; the next one works."""
-    m = Master([std(1)]).start()
-    result = m.ffi.new("fw_result *")
-    assert m.lib.fw_manage(encode_call("RDST", 1)) == 0
-    m.power(True)
-    assert m.lib.fw_manage_result(result) == ABORTED
-    m.power(False)
-    m.until(lambda s: s["phase"] == DATA_EXCHANGE)
-    assert m.lib.fw_manage(encode_call("WPAR", 1, 5)) == 0
-    m.cycles(2)
-    assert m.lib.fw_manage_result(result) == 0 and result.data == 5 and m.slaves[0].parameter == 5
+@pytest.mark.parametrize("bad", [dict(auto_clear=4), dict(auto_clear=1), dict(auto_clear=3, protected_mode=True,
+                                                                             auto_address=True), dict(lps=[1, 0])])
+def test_senseless_permanent_data(bad):
+    """EX-025, NV-005: permanent data that makes no sense is reported, and factory settings are used instead."""
+    m = Master([std(1)], projected=[std(2)])
+    lps, pcd, pp = m.projected
+    controls = dict(data_exchange=True, protected_mode=False, auto_address=False, auto_clear=0)
+    controls.update({k: v for k, v in bad.items() if k != "lps"})
+    everything = m.ffi.new("fw_permanent *", dict(lps=bad.get("lps", lps), pcd=pcd, pp=pp, controls=controls))
+    assert m.lib.fw_init(everything) in (BAD_ARG, -20)
+    assert m.permanent() == (set(), [0xFFFF] * 64, [15] * 64,
+                             dict(protected_mode=0, offline=0, data_exchange=1, auto_address=0, auto_clear=0))
 
 
 @pytest.mark.parametrize("b_first", [True, False])
@@ -580,3 +578,265 @@ def test_clash(b_first):
     standard.present = False
     m.rounds(2)
     assert m.read()["las"] == {9, 37} and m.port.violations == 0
+
+
+# ------------------------------------------------------------------------------------------ status polls, auto clear
+def test_polls():
+    """EX-027, EX-022, FN-023: S1 sets LPF and clears Periphery_OK, S1 = 0 clears LPF; so does leaving LAS."""
+    m = Master([PeripheralSlave(1), PeripheralSlave(5, id=0xA), PeripheralSlave(37, id=0xA)]).start()
+    assert "periphery_ok" in m.read()["flags"]
+    m.slaves[2].fault = True
+    m.until(lambda s: s["lpf"] == {37}, steps=12)
+    assert "periphery_ok" not in m.read()["flags"]
+    m.slaves[0].fault = True
+    m.until(lambda s: s["lpf"] == {1, 37}, steps=12)
+    m.slaves[2].fault = False
+    m.until(lambda s: s["lpf"] == {1}, steps=12)
+    m.slaves[0].present = False
+    m.until(lambda s: s["las"] == {5, 37}, steps=12)
+    assert not m.read()["lpf"] and "periphery_ok" in m.read()["flags"]
+
+
+def test_polls_never_part_an_inclusion():
+    """EX-027, EX-013: no poll between the six calls of an inclusion; at most one in P_RDST_EVERY = 3 cycles."""
+    m = Master([std(1), std(9, present=False)]).start()
+    m.slaves[1].present = True
+    m.until(lambda s: 9 in s["las"])
+    calls = [name_of(c)[0] for c, _, _ in m.log if c >> 10 or c >> 4 & 1 or c >> 5 == 9]
+    first = calls.index("RDID", calls.index("RDST"))  # of the inclusion: detection polls nobody
+    assert calls[first - 1:first + 5] == ["RDIO", "RDID", "RID1", "RID2", "WPAR", "DEXG"]
+    start, cycles = len(m.log), m.cycle_number
+    m.cycles(90)
+    assert [n for n, _ in map(name_of, (c for c, _, _ in m.log[start:]))].count("RDST") == 30 and cycles
+
+
+def test_periphery_without_slaves():
+    """EX-022: without any active slave LPF is empty and Periphery_OK set; nobody is polled."""
+    m = Master([std(0)]).start().cycles(30)
+    assert "periphery_ok" in m.read()["flags"] and "RDST" not in [name_of(c)[0] for c, _, _ in m.log]
+
+
+@pytest.mark.parametrize("start_present", [True, False])
+def test_s1_of_old_slaves(start_present):
+    """EX-028: S1 of a slave that did not answer RID2 is ignored, found in detection or by inclusion; a newer slave on
+    the same address is believed."""
+    m = Master([std(1), PeripheralSlave(4, fault=True, old=True, present=start_present)]).start()
+    m.slaves[1].present = True
+    m.rounds()
+    assert 4 in m.read()["las"] and not m.read()["lpf"] and m.slaves[1].heard["RDST"]
+    m.slaves[1].present = False
+    m.until(lambda s: 4 not in s["las"])
+    m.slaves[1] = PeripheralSlave(4, fault=True)
+    m.until(lambda s: s["lpf"] == {4})
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.2])
+def test_nothing_but_the_legal_telegrams(noise):
+    """EX-029, LK-001, LK-002, LK-003: each cycle: one DEXG per number with one repetition at most, then one extra call:
+    a probe or inclusion call once, a status poll with two repetitions at most."""
+    m = Master([std(1), ab(5), ab(37), std(9), std(30, present=False), std(0)], seed=3).start()
+    m.noise = noise
+    for _ in range(400):
+        if m.random.random() < 0.05:
+            s = m.random.choice(m.slaves)
+            s.present = not s.present
+        numbers = sorted({i & 31 for i in m.read()["las"]})
+        start = len(m.log)
+        m.cycles(1)
+        calls, k = m.log[start:], 0
+        for number in numbers:
+            call = calls[k][0]
+            assert call >> 5 == number and not call & 16
+            k += 2 if calls[k][1] else 1
+            assert k < 2 or calls[k - 1][0] == call or calls[k - 1][1] == 0
+        extra = calls[k:]
+        assert len({c for c, _, _ in extra}) == 1
+        poll = name_of(extra[0][0])[0] == "RDST"
+        assert len(extra) == 1 or poll and len(extra) <= 3 and all(e for _, e, _ in extra[:-1])
+
+
+def test_protected_mode_refused():
+    """EX-032, FN-017: protected mode is refused while slave 0 is detected, and nothing changes; without it is taken."""
+    m = Master([std(1), std(0)]).start()
+    before = m.read()
+    assert m.control(protected_mode=True) == SLAVE0 and m.read() == before and not m.controls()["protected_mode"]
+    m.slaves.pop()
+    m.until(lambda s: 0 not in s["lds"])
+    assert m.control(protected_mode=True) == 0 and m.read()["phase"] == OFFLINE
+
+
+@pytest.mark.parametrize("mode", [0, 1, 2, 3])
+@pytest.mark.parametrize("fault", ["missing", "periphery"])
+def test_auto_clear(mode, fault):
+    """EX-033, FN-018, FN-019, EX-037: the fault of the mode's kind ends in OFFLINE until the host leaves it; data
+    exchange cannot be switched there; other faults do nothing."""
+    slaves = [std(1), PeripheralSlave(2)]
+    m = Master(slaves, projected=slaves, protected_mode=True, auto_clear=mode).start().cycles(20)
+    assert m.read()["las"] == {1, 2}
+    if fault == "missing":
+        slaves[0].present = False
+    else:
+        slaves[1].fault = True
+    m.until(lambda s: s["phase"] == OFFLINE or len(s["las"]) < 2 or s["lpf"], steps=20)
+    if not mode & (1 if fault == "missing" else 2):
+        m.cycles(20)
+        return
+    m.until(lambda s: s["phase"] == OFFLINE, steps=1)
+    for _ in range(20):
+        m.tick()
+    s = m.read()
+    assert s["phase"] == OFFLINE and "offline_ready" in s["flags"] and s["offline_causes"] == 1 << 4 | 4 << 16
+    assert m.controls()["offline"] and m.control(data_exchange=False) == AUTO_CLEAR
+    slaves[0].present, slaves[1].fault = True, False
+    assert m.control(offline=False) == 0
+    m.until(lambda s: s["phase"] == DATA_EXCHANGE)
+    m.cycles(20)
+    assert m.read()["las"] == {1, 2}
+
+
+def test_auto_clear_at_start():
+    """EX-033: a projected slave that is missing from the start stops the line in its first cycle of normal operation."""
+    m = Master([std(1)], projected=[std(1), std(2)], protected_mode=True, auto_clear=1).start()
+    m.cycles(1)
+    assert m.read()["phase"] == OFFLINE and m.controls()["offline"]
+
+
+def test_auto_clear_goes_alone():
+    """EX-033, FN-021: auto clear goes with neither automatic addressing nor configuration mode, whichever comes first."""
+    m = Master([std(1)], projected=[std(1)])
+    assert m.control(auto_clear=1) == AUTO_CLEAR_MODE
+    m.protect()
+    assert m.control(auto_clear=1, auto_address=True) == AUTO_CLEAR_MODE
+    assert m.control(auto_clear=1) == 0
+    assert m.control(auto_address=True) == AUTO_CLEAR_MODE == m.control(protected_mode=False)
+    assert m.controls() == dict(protected_mode=1, offline=0, data_exchange=1, auto_address=0, auto_clear=1)
+    assert m.control(auto_clear=0, auto_address=True) == 0
+
+
+# ------------------------------------------------------------------------------------------ data exchange inactive
+def test_data_exchange_inactive():
+    """EX-024, LK-021, FN-019: RDID instead of DEXG, inputs 0, a slave that vanishes is still noticed; afterwards all of
+    LAS is activated anew, also slaves that were reset meanwhile."""
+    m = Master([std(1, inputs=5), ab(2, inputs=3), ab(34, inputs=9), std(8, inputs=1)])
+    m.host_outputs[1] = 15
+    m.start().cycles(4)
+    m.set_data_exchange(False)
+    m.cycles(1)
+    start = len(m.log)
+    m.cycles(6)
+    calls = [name_of(c) for c, _, _ in m.log[start:]]
+    assert not [n for n in calls if n[0] in ("DEXG", "WPAR")] and {("RDID", i) for i in (1, 2, 8, 34)} <= set(calls)
+    s = m.read()
+    assert s["in"] == [0] * 64 and s["las"] == {1, 2, 8, 34} and s["phase"] == DATA_EXCHANGE
+    m.slaves[3].present = False
+    m.slaves[0].power_up()
+    m.cycles(4)
+    assert m.read()["las"] == {1, 2, 34}
+    m.set_data_exchange(True)
+    start = len(m.log)
+    m.until(lambda s: s["phase"] == ACTIVATION, steps=4)
+    m.until(lambda s: s["phase"] == DATA_EXCHANGE, steps=4)
+    assert [n for n in m.names(start) if n[0] == "WPAR"] == [("WPAR", 1), ("WPAR", 2), ("WPAR", 2)]
+    m.cycles(4)
+    s = m.read()
+    assert s["las"] == {1, 2, 34} and [s["in"][i] for i in (1, 2, 34)] == [5, 3, 9] and m.slaves[0].outputs == 0
+    assert m.port.violations == 0
+
+
+# ------------------------------------------------------------------------------------------ history
+def test_changed_codes():
+    """EX-035, EX-016: other codes under a known address: not active in protected mode, Config_OK 0, CDI shows them;
+    with the old codes all is as before."""
+    good = std(4, io=3)
+    m = Master([std(1), good], projected=[std(1), std(4, io=3)], protected_mode=True).start()
+    assert "config_ok" in m.read()["flags"]
+    good.io = 5
+    m.cycles(10)
+    assert m.read()["las"] == {1, 4}  # DEXG tells nothing
+    good.present = False
+    m.until(lambda s: s["las"] == {1})
+    good.present = True
+    m.rounds(2)
+    s = m.read()
+    assert s["las"] == {1} and s["lds"] == {1, 4} and s["cdi"][4] & 15 == 5 and "config_ok" not in s["flags"]
+    good.io = 3
+    m.rounds()
+    assert m.read()["las"] == {1, 4} and "config_ok" in m.read()["flags"]
+
+
+def test_history_of_changes():
+    """EX-036: the slaves that broke Config_OK the last time, and when; they stay shown after all is well again."""
+    slaves = [std(1), std(4), ab(37)]
+    m = Master(slaves, projected=slaves, protected_mode=True).start().cycles(5)
+    assert not m.read()["changed_slaves"]
+    slaves[1].present = slaves[2].present = False
+    m.until(lambda s: s["las"] == {1}, steps=12)
+    s = m.read()
+    assert s["changed_slaves"] == {4, 37} and "config_ok" not in s["flags"]
+    assert 0 <= m.port.time_us - s["changed_us"] < 5_000
+    slaves[1].present = slaves[2].present = True
+    m.until(lambda s: s["las"] == {1, 4, 37})
+    m.cycles(10)
+    assert m.read()["changed_us"] == s["changed_us"] and m.read()["changed_slaves"] == {4, 37}
+    m.slaves.append(std(9))
+    m.until(lambda s: 9 in s["lds"])
+    assert m.read()["changed_slaves"] == {9} and m.read()["changed_us"] > s["changed_us"]
+
+
+def test_history_of_offline():
+    """EX-037: bits of all causes since start-up, the last one, and its time."""
+    m = Master([std(1)], projected=[std(1)]).start()
+    assert m.read()["offline_causes"] == 0
+    seen = 0
+    for cause, act in ((1, lambda: m.set_offline(True)), (2, lambda: m.power(True)), (3, lambda: m.protect())):
+        act()
+        seen |= 1 << cause
+        assert m.read()["offline_causes"] == seen | cause << 16 and m.read()["offline_us"] == m.port.time_us
+        m.power(False)
+        m.set_offline(False)
+        m.until(lambda s: s["phase"] == DATA_EXCHANGE)
+        m.cycles(3)
+    assert m.read()["offline_us"] < m.port.time_us
+
+
+def test_event_log():
+    """EX-038: events in their order with rising bus time, the last 64 kept; entries and departures give the lists."""
+    m = Master([std(1), std(4), ab(37)]).start()
+    seen, known, lds = [], 0, m.read()["lds"]
+    for k in range(40):
+        s = m.slaves[m.random.randrange(3)]
+        s.present = not s.present
+        s.power_up()
+        m.cycles(150 if k % 2 else 3)
+        head, last = m.events()
+        assert head - known <= 64
+        seen += last[len(last) - (head - known):] if head > known else []
+        known = head
+    assert known > 64 and len(seen) == known and [e[0] for e in seen] == sorted(e[0] for e in seen)
+    assert [e[3] for e in seen if e[1] == 2] == [DETECTION, ACTIVATION, DATA_EXCHANGE]
+    for _, event, index, data in seen[[e[3] if e[1] == 2 else 0 for e in seen].index(DATA_EXCHANGE):]:
+        if event == 4:
+            lds.add(index)
+        elif event == 5:
+            lds.remove(index)
+    assert lds == m.read()["lds"]
+
+
+def test_suspected_duplicates():
+    """EX-034: garbled answers raise the suspicion, missing ones lower it, good ones too; a list only, nothing acts."""
+    m = Master([std(1), std(4)]).start()
+    las = m.read()["las"]
+    m.lib.fw_quality(4, 10, 0, 11)
+    assert not m.read()["suspects"]
+    m.lib.fw_quality(4, 10, 0, 1)  # P_SUSPECT = 12
+    assert m.read()["suspects"] == {4}
+    m.lib.fw_quality(1, 0, 50, 3)  # a dead slave
+    assert m.read()["suspects"] == {4}
+    m.lib.fw_quality(4, 0, 6, 0)
+    assert not m.read()["suspects"] and m.read()["las"] == las
+    m.lib.fw_quality(4, 0, 0, 1000)  # the points are limited: one bad hour is not held against it for ever
+    for _ in range(24):
+        assert m.read()["suspects"] == {4}
+        m.lib.fw_quality(4, 16, 0, 0)
+    assert not m.read()["suspects"]
+    assert [e[1:] for e in m.events()[1] if e[1] == 12] == [(12, 4, 1), (12, 4, 0)] * 2
