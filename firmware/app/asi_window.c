@@ -62,7 +62,7 @@ void asi_window_take_outputs(asi_ec_t *ec)
     for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++)
         image[w] = WIN(OUT_IMG)[w];
     asi_fn_write_odi(ec, image);
-    if (asi_list_is_empty(&ec->ctt.open))
+    if (!asi_ctt_any(&ec->ctt))
         return;
     const volatile uint32_t *from = WIN(AODI); /* a word is two values: each is whole (CT-002) */
     uint16_t *to = ec->ctt.ao;
@@ -137,7 +137,7 @@ static void show_state(asi_ec_t *ec)
         WINDOW(uint8_t, PECHO)[i] = s->pecho[i];
     }
     asi_ec_changes_taken(ec);
-    analog_numbers = ec->ctt.open.w[0] | ec->ctt.open.w[1];
+    analog_numbers = ec->ctt.live.w[0] | ec->ctt.live.w[1] | ec->ctt.groups.w[0] | ec->ctt.groups.w[1];
     show_log(&ec->log);
 }
 
@@ -153,7 +153,7 @@ void asi_window_publish(asi_ec_t *ec)
     WIN(REPEATED)[0] = counters.repeated;
     WIN(FAILED)[0] = counters.failed;
     WIN(TIME_US)[0] = asi_port_time_us();
-    if (!asi_list_is_empty(&ec->ctt.open) || !asi_list_is_empty(&ec->ctt.changed))
+    if (asi_ctt_any(&ec->ctt) || !asi_list_is_empty(&ec->ctt.changed))
         show_analog(ec);
     if (asi_window_is_stale(ec))
         show_state(ec);

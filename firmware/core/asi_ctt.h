@@ -143,6 +143,12 @@ typedef struct {
     asi_ctt_slave_t slave[ASI_INDICES];
 } asi_ctt_t;
 
+/** Whether any slave is open: else images and calls are plain. */
+static inline bool asi_ctt_any(const asi_ctt_t *c)
+{
+    return (c->live.w[0] | c->live.w[1] | c->groups.w[0] | c->groups.w[1] | c->safety.w[0] | c->safety.w[1]) != 0u;
+}
+
 /** Kind for these codes (IO 3..0, ID 7..4, ID1 11..8, ID2 15..12). */
 asi_ctt_kind_t asi_ctt_kind(uint16_t codes);
 /** Nothing open; all values 0. */

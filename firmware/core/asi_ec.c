@@ -353,7 +353,7 @@ void asi_ec_exchange_done(asi_ec_t *ec)
 static void ctt_images(asi_ec_t *ec, uint32_t in[ASI_IMAGE_WORDS])
 {
     asi_list_t called = ASI_LIST_EMPTY, failed = ASI_LIST_EMPTY;
-    const asi_list_t groups = asi_list_without(&ec->ctt.open, &ec->ctt.live);
+    const asi_list_t groups = {{ec->ctt.groups.w[0] | ec->ctt.safety.w[0], ec->ctt.groups.w[1] | ec->ctt.safety.w[1]}};
     for (unsigned i = asi_list_next(&groups, 0u); i < ASI_INDICES; i = asi_list_next(&groups, i + 1u)) {
         const asi_slot_state_t slot = asi_port_slot_state(i);
         if (slot.calls == ec->calls[i])
@@ -387,7 +387,7 @@ asi_status_t asi_ec_cycle_done(asi_ec_t *ec, const asi_cycle_report_t *report)
     poll_status(ec);
     for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++)
         ec->state.in[w] = ec->permanent.data_exchange ? report->in[w] & ec->las_mask[w] : 0u;
-    if (!asi_list_is_empty(&ec->ctt.open) && ec->permanent.data_exchange)
+    if (asi_ctt_any(&ec->ctt) && ec->permanent.data_exchange)
         ctt_images(ec, ec->state.in);
     ec_send_outputs(ec);
     auto_clear(ec);
