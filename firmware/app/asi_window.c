@@ -281,11 +281,9 @@ static void serve_function(asi_ec_t *ec)
         }
         end_function(job->status, job->data);
     }
-    if (WIN(FN_SEQ)[0] == fn_seq)
+    const uint32_t seq = WIN(FN_SEQ)[0];
+    if (seq == fn_seq)
         return;
-    if (job->status == ASI_E_BUSY)
-        return; /* automatic addressing: the function waits */
-    fn_seq = WIN(FN_SEQ)[0];
     const uint32_t code = WIN(FN_CODE)[0], a = WIN(FN_ARG)[0], b = WIN(FN_ARG)[1], length = WIN(FN_LEN)[0];
     asi_status_t status = ASI_E_OVERFLOW;
     if (length <= sizeof string->bytes && length <= STRING_BYTES) {
@@ -293,6 +291,10 @@ static void serve_function(asi_ec_t *ec)
             for (unsigned k = 0; k < length; k++)
                 string->bytes[k] = WINDOW(uint8_t, FN_STRING)[k];
         hal_irq_off();
+        if (asi_fn_busy(ec)) { /* automatic addressing, which begins in the interrupt: the function waits */
+            hal_irq_on();
+            return;
+        }
         asi_window_take_outputs(ec); /* as in a commit */
         status = start_function(ec, code, a, b, length);
         if (asi_ec_state(ec)->permanent_version != shown_permanent)
@@ -302,6 +304,7 @@ static void serve_function(asi_ec_t *ec)
             asi_window_publish(ec);
         hal_irq_on();
     }
+    fn_seq = seq;
     fn_open = status == ASI_E_BUSY;
     if (!fn_open)
         end_function(status, 0u);

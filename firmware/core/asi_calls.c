@@ -48,7 +48,7 @@ unsigned asi_call_index(uint16_t call, bool extended)
 {
     const unsigned number = (unsigned)call >> 5 & 31u;
     const bool i3 = (call & I3) != 0u;
-    bool sel; /* CA-004: DEXG, WPAR, RES and RDST carry ~Sel, the other commands Sel */
+    bool sel; /* CA-004: DEXG, WPAR, RES, RDST and R1 carry ~Sel, the other commands Sel */
     if (number == 0u)
         sel = false;
     else if (!(call & CB))
@@ -58,25 +58,28 @@ unsigned asi_call_index(uint16_t call, bool extended)
     return number + (sel ? 32u : 0u);
 }
 
+uint16_t asi_call_execute(unsigned number, unsigned info)
+{
+    const uint16_t call = payload(CB, number, info);
+    if (number > 31u || info > 31u)
+        return 0;
+    if (call == ASI_CALL_BR01 || (number == 0u && info < 16u)) /* broadcast; WID1 with any code */
+        return call;
+    switch (info & ~I3) {
+    case 0x10: case 0x11: case 0x12: case 0x13: /* RDIO RDID RID1 RID2 */
+    case 0x14:                                  /* RES */
+    case 0x16: case 0x17:                       /* RDST R1 */
+        return call;
+    default: /* DELA, PRGM, reserved codes */
+        return 0;
+    }
+}
+
 bool asi_call_is_legal(uint16_t call)
 {
-    const unsigned number = (unsigned)call >> 5 & 31u;
-    const unsigned info = call & 31u;
     if (call >= 0x800u)
         return false;
     if (!(call & CB)) /* DEXG, WPAR; at address 0 ADRA */
         return true;
-    if (call == ASI_CALL_BR01)
-        return true;
-    if (number == 0u && info < 16u) /* WID1; 0 to address 0 is DELA there, without effect */
-        return info != 0u;
-    switch (info & ~I3) {
-    case 0x00:               /* DELA */
-    case 0x10: case 0x11: case 0x12: case 0x13: /* RDIO RDID RID1 RID2 */
-    case 0x14:               /* RES: 11100, B 10100 */
-    case 0x16:               /* RDST: 11110, B 10110 */
-        return true;
-    default: /* PRGM 11101, Read_Reset_Status 11111, reserved codes */
-        return false;
-    }
+    return (call & 0x17u) == ASI_CMD_DELA || asi_call_execute((unsigned)call >> 5 & 31u, call & 31u) != 0u;
 }

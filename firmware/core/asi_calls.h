@@ -17,6 +17,7 @@ typedef enum {
     ASI_CMD_RID2 = 0x13, /**< Read_Extended_ID-Code_2 */
     ASI_CMD_RES = 0x1C,  /**< Reset_Slave, answer 6 */
     ASI_CMD_RDST = 0x1E, /**< Read_Status */
+    ASI_CMD_R1 = 0x1F,   /**< Read_Reset_Status of specification 2.0: the status, which is cleared then; on demand only */
 } asi_command_t;
 
 /** Broadcast reset to all slaves; nobody answers. */
@@ -34,6 +35,8 @@ uint16_t asi_call_wid1(unsigned id1);
 uint16_t asi_call_command(asi_command_t command, unsigned index);
 /** Index a call is meant for. extended: the number has A/B slaves, so I3 of DEXG and WPAR is ~Sel and not data. */
 unsigned asi_call_index(uint16_t call, bool extended);
+/** Execute_Command: the payload of number 0..31 and I4..I0, when it is one that function may send (FN-022); else 0. */
+uint16_t asi_call_execute(unsigned number, unsigned info);
 /** Whether a master may send this payload: one of the calls above, and not Enter_Program_Mode or a reserved code. */
 bool asi_call_is_legal(uint16_t call);
 #endif

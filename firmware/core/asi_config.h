@@ -58,6 +58,14 @@
 #ifndef ASI_NVM_POLL_US
 #define ASI_NVM_POLL_US 5000u
 #endif
+/** P_RESET, us: a slave is ready again after Reset_Slave (FN-022). */
+#ifndef ASI_RESET_US
+#define ASI_RESET_US 2000u
+#endif
+/** P_RESCUE, tries: giving a slave its old address back after a failed change (AD-004). */
+#ifndef ASI_RESCUE_TRIES
+#define ASI_RESCUE_TRIES 5u
+#endif
 /** P_AUTO_WAIT, us: a failed automatic addressing is tried again after this (AD-009). */
 #ifndef ASI_AUTO_WAIT_US
 #define ASI_AUTO_WAIT_US 1000000u

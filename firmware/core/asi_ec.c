@@ -4,9 +4,11 @@
 
 /* ------------------------------------------------------------------------------------------ batches */
 
+#define ZERO_SEL1 32u /**< detection: address 0 with Sel = 1 (AD-007) */
+
 static void add_request(asi_ec_t *ec, unsigned index, uint16_t call)
 {
-    ec->requests[ec->batch_len] = (asi_request_t){.call = call, .retries = ASI_CMD_RETRY, .sel = index >= 32u}; /* EX-010 */
+    ec->requests[ec->batch_len] = (asi_request_t){.call = call, .retries = ASI_CMD_RETRY, .sel = index > ZERO_SEL1}; /* EX-010 */
     ec->request_index[ec->batch_len] = (uint8_t)index;
     ec->batch_len++;
 }
@@ -99,9 +101,11 @@ void ec_stop(asi_ec_t *ec, asi_offline_cause_t cause)
     dispatch(ec, EV_STOP);
 }
 
-void ec_reactivate(asi_ec_t *ec)
+void ec_reactivate(asi_ec_t *ec, uint32_t pause_us)
 {
     ec->reactivate = true;
+    ec->reactivate_from_us = asi_port_time_us();
+    ec->reactivate_pause_us = pause_us;
     asi_port_cycle(0);
 }
 
@@ -138,7 +142,8 @@ static event_t begin_detection(asi_ec_t *ec)
     }
     ec->sel = false;
     ec->step = READ_IO;
-    ec->extended_numbers = (asi_list_t){{0xFFFFFFFEu, 0u}}; /* until proven standard; address 0 has no Sel = 1 pass */
+    ec->extended_numbers = (asi_list_t){{0xFFFFFFFFu, 0u}}; /* until proven standard */
+    ec->zero_sel = false;
     ec->todo = (asi_list_t){{0xFFFFFFFFu, 0u}};
     asi_port_line(true);
     detection_batch(ec);
@@ -179,12 +184,24 @@ static void detection_results(asi_ec_t *ec, const asi_result_t *results)
     }
 }
 
+/** Slave i is read. */
+static void detected(asi_ec_t *ec, unsigned i)
+{
+    if (i == ZERO_SEL1) {
+        ec->zero_sel = true;
+        if (asi_list_has(&ec->no_id2, ZERO_SEL1))
+            asi_list_add(&ec->no_id2, 0u);
+        asi_list_remove(&ec->no_id2, ZERO_SEL1);
+    }
+    ec_enter_lds(ec, i == ZERO_SEL1 ? 0u : i, ec->codes[i]);
+}
+
 static event_t detection_next(asi_ec_t *ec, const asi_result_t *results)
 {
     detection_results(ec, results);
     if (ec->step == READ_ID12) {
         for (unsigned i = asi_list_next(&ec->todo, 0u); i < ASI_INDICES; i = asi_list_next(&ec->todo, i + 1u))
-            ec_enter_lds(ec, i, ec->codes[i]);
+            detected(ec, i);
         ec->todo = ASI_LIST_EMPTY;
         ec_update_flags(ec);
     } else {
@@ -448,7 +465,7 @@ void asi_ec_power(asi_ec_t *ec, bool apf)
 
 void asi_ec_tick(asi_ec_t *ec, uint32_t elapsed_us)
 {
-    if (ec->reactivate && asi_port_idle())
+    if (ec->reactivate && asi_port_idle() && asi_port_time_us() - ec->reactivate_from_us >= ec->reactivate_pause_us)
         dispatch(ec, EV_AGAIN);
     if (ec->state.phase != ASI_PHASE_OFFLINE)
         return;

@@ -78,13 +78,14 @@ typedef struct {
     asi_ctt_t ctt;
     asi_log_t log;
     asi_permanent_t permanent;
-    asi_job_t job;
+    asi_job_t job, automatic;     /* the host's; automatic addressing. At most one is open */
     bool offline, auto_cleared;   /* asked for by the host; the auto-clear end state */
     /* power-up, OFFLINE */
     bool apf, power_up;
     uint32_t settle_left_us;
     /* batches of DETECTION and ACTIVATION */
     bool batch_open, reactivate;
+    uint32_t reactivate_from_us, reactivate_pause_us;  /* reset slaves are given time (FN-022) */
     bool sel;                     /* detection pass over Sel = 1 */
     uint8_t step;
     uint8_t batch_len;
@@ -100,6 +101,9 @@ typedef struct {
     uint16_t inclusion_codes;
     bool inclusion_no_id2;
     asi_list_t held;              /* indices inclusion keeps away from: an address is being changed */
+    bool zero_sel, zero_other;    /* the select a slave at address 0 answers (AD-007); the probe was sent with both */
+    bool auto_failed;             /* automatic addressing failed with this slave 0, */
+    uint32_t auto_failed_us;      /* and when (AD-009) */
     uint8_t owner, management_tag;
     uint8_t poll_index, poll_wait;
     asi_list_t wrong;             /* slaves that are not as projected */

@@ -15,7 +15,9 @@ bool ec_may_activate(const asi_ec_t *ec, unsigned index);
 void ec_update_flags(asi_ec_t *ec);
 void ec_set_echo(asi_ec_t *ec, unsigned index, uint8_t echo);
 void ec_set_pi(asi_ec_t *ec, unsigned index, uint8_t parameter);
-/** The parameter a slave is activated with: PI, or F where the master owns the parameters (S-7.4). */
+/** S-7.4: the parameter selects strings, so the master owns it (FN-005). */
+bool ec_has_strings(const asi_ec_t *ec, unsigned index);
+/** The parameter a slave is activated with: PI, or F where the master owns it. */
 unsigned ec_parameter(const asi_ec_t *ec, unsigned index);
 void ec_enter_las(asi_ec_t *ec, unsigned index);
 void ec_leave_las(asi_ec_t *ec, unsigned index);
@@ -38,8 +40,8 @@ static inline void put_code(uint16_t *codes, unsigned position, unsigned nibble)
 /* ---- asi_ec.c */
 /** Into OFFLINE, from any phase. */
 void ec_stop(asi_ec_t *ec, asi_offline_cause_t cause);
-/** Activate all of LAS anew (EX-024), as soon as the cycle has ended. */
-void ec_reactivate(asi_ec_t *ec);
+/** Activate all of LAS anew (EX-024), as soon as the cycle has ended and pause_us are over. */
+void ec_reactivate(asi_ec_t *ec, uint32_t pause_us);
 /** One call for the next management slot. Only when ec->owner is ASI_OWNER_NONE, in normal operation. */
 void ec_manage(asi_ec_t *ec, asi_owner_t owner, uint16_t call, unsigned index, unsigned retries, bool no_reply);
 
@@ -54,7 +56,7 @@ void ec_inclusion_hold(asi_ec_t *ec, const asi_list_t *held);
 /* ---- asi_jobs.c */
 /** Result of a call with owner JOB. */
 void ec_job_result(asi_ec_t *ec, const asi_result_t *result);
-/** Once per cycle, after the results: time goes on for a job that waits; automatic addressing may begin. */
+/** Once per cycle, after the results: time goes on for a job that waits; automatic addressing may begin (AD-008). */
 void ec_job_cycle(asi_ec_t *ec);
 /** OFFLINE or a new activation: an open job ends as ABORTED. */
 void ec_job_abort(asi_ec_t *ec);

@@ -146,7 +146,7 @@ asi_status_t asi_fn_set_controls(asi_ec_t *ec, const asi_controls_t *c)
     ec->offline = c->offline;
     if (ec->state.phase == ASI_PHASE_DATA_EXCHANGE) { /* EX-024 */
         if (starts)
-            ec_reactivate(ec);
+            ec_reactivate(ec, 0u);
         else if (stops && !ec->reactivate)
             ec_run_cycle(ec);
     }

@@ -45,6 +45,11 @@ asi_controls_t asi_fn_controls(const asi_ec_t *ec);
  * the caller has put into ec->ctt.string.bytes. @return the refusals of FN-005 ..; ASI_E_BUSY: one is open.
  * Then asi_fn_job tells how it goes. */
 ASI_MUST_USE asi_status_t asi_fn_start(asi_ec_t *ec, asi_job_kind_t kind, unsigned index, unsigned value, unsigned length);
-/** The job begun last; its status is ASI_E_BUSY while it runs. */
+/** Whether a function with telegrams would be refused as ASI_E_BUSY: one is open, or automatic addressing. */
+static inline bool asi_fn_busy(const asi_ec_t *ec)
+{
+    return ec->job.status == ASI_E_BUSY || ec->automatic.status == ASI_E_BUSY;
+}
+/** The job begun last by asi_fn_start; its status is ASI_E_BUSY while it runs. */
 static inline const asi_job_t *asi_fn_job(const asi_ec_t *ec) { return &ec->job; }
 #endif

@@ -23,12 +23,12 @@ static void request_step(asi_ec_t *ec, unsigned step)
     else if (step == INCLUDE_DEXG)
         request.call = asi_call_dexg(i, 15u, ec_is_extended(ec, i));
     else
-        request.call = asi_call_command((asi_command_t)read[step], i);
+        request.call = asi_call_command((asi_command_t)read[step], i == 0u && ec->zero_sel ? 32u : i);
     asi_port_inclusion(&request);
     ec->inclusion_open = true;
 }
 
-/** EX-012: the next address not in LAS, 0 included, all of Sel = 0, then all of Sel = 1, wrapping. */
+/** EX-012: the next address not in LAS, 0 included with both selects, all of Sel = 0, then all of Sel = 1, wrapping. */
 static void probe_next(asi_ec_t *ec)
 {
     const asi_list_t all = {{0xFFFFFFFFu, 0xFFFFFFFEu}};
@@ -44,6 +44,9 @@ static void probe_next(asi_ec_t *ec)
     }
     ec->inclusion_index = (uint8_t)i;
     ec->inclusion_failures = 0;
+    ec->zero_other = i != 0u;
+    if (i == 0u && !asi_list_has(&ec->state.lds, 0u))
+        ec->zero_sel = false; /* AD-007 */
     request_step(ec, PROBE);
 }
 
@@ -112,10 +115,15 @@ void ec_inclusion_result(asi_ec_t *ec, const asi_result_t *result)
     switch (step) {
     case PROBE:
         ec->inclusion_codes = (uint16_t)(0xFFF0u | result->data);
-        if (good)
+        if (good) {
             request_step(ec, INCLUDE_ID);
-        else
+        } else if (!ec->zero_other) { /* AD-007: an A/B slave at address 0 may obey the other select */
+            ec->zero_other = true;
+            ec->zero_sel = !ec->zero_sel;
+            request_step(ec, PROBE);
+        } else {
             candidate_missed(ec);
+        }
         break;
     case INCLUDE_ID:
     case INCLUDE_ID1:

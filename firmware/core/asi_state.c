@@ -34,11 +34,15 @@ bool ec_may_activate(const asi_ec_t *ec, unsigned index)
     return ec->permanent.protected_mode ? matches(ec, index) : !clashes(ec, index);
 }
 
-unsigned ec_parameter(const asi_ec_t *ec, unsigned index)
+bool ec_has_strings(const asi_ec_t *ec, unsigned index)
 {
     const unsigned kind = asi_ctt_kind(ec->state.cdi[index]);
-    const bool owned = (kind == ASI_CTT_1_IN || kind == ASI_CTT_1_OUT) && asi_codes_id(ec->state.cdi[index]) == 4u;
-    return owned ? ASI_CTT1_PAR_DATA : ec->state.pi[index];
+    return (kind == ASI_CTT_1_IN || kind == ASI_CTT_1_OUT) && asi_codes_id(ec->state.cdi[index]) == 4u;
+}
+
+unsigned ec_parameter(const asi_ec_t *ec, unsigned index)
+{
+    return ec_has_strings(ec, index) ? ASI_CTT1_PAR_DATA : ec->state.pi[index];
 }
 
 unsigned ec_auto_clear_cause(const asi_ec_t *ec)
