@@ -159,27 +159,27 @@ bool asi_ctt_open(asi_ctt_t *c, unsigned index, uint16_t codes, uint32_t now_us)
 void asi_ctt_close(asi_ctt_t *c, unsigned index);
 /** First nibble of a live slave after asi_ctt_open, line level. */
 unsigned asi_ctt_first(asi_ctt_t *c, unsigned index, unsigned outputs);
-/** One call of a live slave is over. @return the nibble of its next call, line level (I3 of an A/B slave is not used) */
+/** One call of a live slave is over. @return nibble of its next call, line level (I3 of an A/B slave is not used) */
 unsigned asi_ctt_call(asi_ctt_t *c, unsigned index, const asi_ctt_call_t *call);
 /** Digital inputs of a live slave for IDI, from its last answer, host level. */
 unsigned asi_ctt_inputs(const asi_ctt_t *c, unsigned index, unsigned answer);
-/** End of a cycle for the kinds that are not live: groups of CTT5 and safety slaves. failed: indices called in this cycle
- * without an answer. in: input image, corrected in place (a failed safety slave is 0). out: host image; CTT5 members get
- * their nibbles of AODI in it. codes: CDI. */
+/** End of a cycle for the kinds that are not live: groups of CTT5 and safety slaves. failed: indices called in this
+ * cycle without an answer. in: input image, corrected in place (a failed safety slave is 0). out: host image; CTT5
+ * members get their nibbles of AODI in it. codes: CDI. */
 void asi_ctt_cycle(asi_ctt_t *c, const asi_list_t *las, const asi_list_t *called, const asi_list_t *failed,
                    const uint16_t codes[ASI_INDICES], uint32_t in[ASI_IMAGE_WORDS], uint32_t out[ASI_IMAGE_WORDS]);
 /** Members of incomplete CTT5 groups in LAS: a configuration error (CT-052). */
 asi_list_t asi_ctt_incomplete(const asi_ctt_t *c, const asi_list_t *las, const uint16_t codes[ASI_INDICES]);
-/** Before the WPAR that selects a string mode of a CTT1 slave: cyclic values pause. A slave that changes its mode between
- * two triples would else mix a value of both. Call it until true, about once per cycle, then send WPAR.
+/** Before the WPAR that selects a string mode of a CTT1 slave: cyclic values pause. A slave that changes its mode
+ * between two triples would else mix a value of both. Call it until true, about once per cycle, then send WPAR.
  * @return true: the slave has served all calls so far (or has no CTT1) and WPAR may go out */
 ASI_MUST_USE bool asi_ctt_hold(asi_ctt_t *c, unsigned index);
 /** After the WPAR that selects normal data again, or when a string was given up: values go on with their first triple.
  * A string still open ends with ASI_E_ABORTED. Nothing for other kinds. */
 void asi_ctt_release(asi_ctt_t *c, unsigned index, uint32_t now_us);
 /** Begin a string or message of c->string.bytes (length: bytes to write). Strings: between asi_ctt_hold and
- * asi_ctt_release, the caller has set the slave's parameter; whole sequences of 3 bytes, F and V are made here. Messages
- * need no hold.
+ * asi_ctt_release, the caller has set the slave's parameter; whole sequences of 3 bytes, F and V are made here.
+ * Messages need no hold.
  * @return ASI_E_NOT_ACTIVE, ASI_E_PROFILE, ASI_E_BUSY, ASI_E_STATE (not held), ASI_E_OVERFLOW, ASI_E_ARG (not whole
  * sequences; no request code of CTT2 or a length that does not go with it); else progress shows in c->string: status
  * ASI_OK, ASI_E_TRANSFER, ASI_E_OVERFLOW (the slave has more), ASI_E_DEVICE (bytes: its error response), ASI_E_ABORTED;

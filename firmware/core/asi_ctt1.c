@@ -3,23 +3,23 @@
  * @file asi_ctt1.c  Combined transaction type 1: values of up to 16 bits and strings, a triple of bits per call.
  * The receiver of the data names the triple it wants: an input slave is called with {control bit, number} and answers
  * {control bit, triple}; an output slave is called with {control bit, triple} and answers {control bit, wanted number}.
- * A triple is accepted when the answer's control bit is that of the call; only then does the control bit toggle. A call that
- * was lost, or sent twice, therefore changes nothing. Numbers inside count down, 0 = the triple with O and V.
+ * A triple is accepted when the answer's control bit is that of the call; only then does the control bit toggle. A call
+ * that was lost, or sent twice, therefore changes nothing. Numbers inside count down, 0 = the triple with O and V.
  */
 #include "asi_ctt_private.h"
 
 enum { HELD, VALUE, STRING_READ, STRING_WRITE };
-enum { FIRST_OF_STRING = ASI_CTT1_SEQUENCE_TRIPLES - 1, FIRST_OF_VALUE = ASI_CTT1_VALUE_TRIPLES - 1 };
+enum { FIRST_OF_STRING = ASI_CTT1_SEQUENCE_TRIPLES - 1 };
 
 #define CONTROL (1u << ASI_CTT1_TOGGLE_POS)
 #define LINE (ASI_CTT1_INVERT_OUT ? 15u : 0u)
 #define VALID_AND_NO_OVERFLOW 1u /* last triple without its data bit: O V */
 
 _Static_assert(ASI_CTT1_TOGGLE_POS == 3 || ASI_CTT1_TOGGLE_POS == 0, "three neighbouring bits are left");
-_Static_assert(ASI_CTT1_TRIPLES_71 >= 2 && ASI_CTT1_TRIPLES_71 <= 6, "6 .. 18 bits");
-_Static_assert(ASI_CTT1_TRIPLES_72 >= 2 && ASI_CTT1_TRIPLES_72 <= 6, "6 .. 18 bits");
+_Static_assert(ASI_CTT1_TRIPLES_71 >= 3 && ASI_CTT1_TRIPLES_71 <= 7, "E and 6 .. 18 bits");
+_Static_assert(ASI_CTT1_TRIPLES_72 >= 3 && ASI_CTT1_TRIPLES_72 <= 7, "E and 6 .. 18 bits");
 _Static_assert(ASI_CTT1_STRING_BYTES % 3 == 0, "whole sequences");
-_Static_assert(FIRST_OF_STRING == 7 && FIRST_OF_VALUE == 6, "a triple's number has three bits");
+_Static_assert(FIRST_OF_STRING == 7 && ASI_CTT1_VALUE_TRIPLES == 7, "a triple's number has three bits");
 
 static unsigned reversed(unsigned three)
 {
@@ -56,11 +56,17 @@ static void say(asi_ctt1_t *s, unsigned t)
     next(s, triple(s->frame >> (3u * t) & 7u));
 }
 
+/* bits of a value that its triples carry */
+static unsigned data_mask(const asi_ctt1_t *s)
+{
+    return 0xFFFFu << s->align & 0xFFFFu;
+}
+
 /* outputs: take the value of this channel; it is sent whole, whatever the host writes meanwhile */
 static void latch(asi_ctt1_t *s, const asi_ctt_t *c, unsigned index)
 {
     const unsigned value = c->ao[asi_analog_word(index) + s->channel];
-    s->frame = extension(s->channel) << 18 | value >> s->align << 2 | VALID_AND_NO_OVERFLOW;
+    s->frame = (extension(s->channel) << 18 | (value & data_mask(s)) << 2) >> s->align | VALID_AND_NO_OVERFLOW;
 }
 
 static void substitute(asi_ctt_t *c, unsigned index)
@@ -80,11 +86,9 @@ void asi_ctt1_open(asi_ctt_t *c, unsigned index, uint16_t codes, uint32_t now_us
     s->strings = id == 4u;
     s->transparent = id == 3u && (id2 >> 2 & 1u) == ASI_CTT1_ID2_TRANSPARENT;
     s->channels = (uint8_t)((id2 & 2u) != 0u ? 4u : 1u + (id2 & 1u));
-    if (id <= 2u) { /* one channel without E triple, shorter values left-aligned */
+    if (id <= 2u) /* shorter values, left-aligned */
         triples = id == 1u ? ASI_CTT1_TRIPLES_71 : ASI_CTT1_TRIPLES_72;
-        s->channels = 1u;
-        s->align = (uint8_t)(18u - 3u * triples);
-    }
+    s->align = (uint8_t)(3u * (7u - triples));
     s->first = (uint8_t)(triples - 1u);
     s->last_us = now_us;
     substitute(c, index);
@@ -122,10 +126,11 @@ static void value_in(asi_ctt_t *c, unsigned index, unsigned three)
     } else if (s->t != 0u) {
         t = s->t - 1u;
     } else {
-        const unsigned channel = s->first == FIRST_OF_VALUE ? extension(s->frame >> 18 & 7u) : 0u;
+        const uint32_t frame = s->frame << s->align; /* E in bits 20..18, D16 in bit 17 */
+        const unsigned channel = extension(frame >> 18 & 7u);
         if (channel < s->channels) { /* else nobody knows whose value it is */
             const bool valid = (s->frame & 3u) == VALID_AND_NO_OVERFLOW;
-            const unsigned value = s->frame >> 2 << s->align & 0xFFFFu;
+            const unsigned value = frame >> 2 & data_mask(s);
             asi_ctt_show(c, index, channel, valid ? value : s->transparent ? 0u : CTT_SUBSTITUTE, valid);
             asi_ctt_status_set(c, index, 0u, ASI_CTT_TV);
         }
@@ -291,7 +296,7 @@ static void overdue(asi_ctt_t *c, unsigned index, uint32_t now_us)
 {
     asi_ctt1_t *s = &c->slave[index].one;
     s->last_us = now_us;
-    if (s->mode == VALUE) { /* toggle error. The nibble stays: the slave may have served it, so another would be mistaken */
+    if (s->mode == VALUE) { /* toggle error. The nibble stays: the slave may have served it and would mistake another */
         s->drop = !s->output;
         substitute(c, index);
         asi_ctt_status_set(c, index, ASI_CTT_OV | ASI_CTT_TV, 0u);

@@ -2,8 +2,8 @@
 /**
  * @file asi_ctt2.c  Combined transaction type 2: messages, a bit per two calls, with a clock line each way.
  * The master's clock moves on only when the nibble with its last level was answered, so the slave sees every level; a call
- * that was sent twice shows the same level twice. The receiver looks at every answer. A slave whose answer was lost goes on all
- * the same: its message is a bit short then, never complete, and ends in a gap; the request is sent again.
+ * that was sent twice shows the same level twice. The receiver looks at every answer. A slave whose answer was lost may go
+ * on all the same: its message is a bit short then, never complete, and ends in a gap; a cyclic request is sent again.
  */
 #include "asi_ctt_private.h"
 
@@ -107,6 +107,8 @@ static void choose(asi_ctt_t *c, unsigned index)
             s->bytes[1u + 2u * k] = (uint8_t)(ao[k] >> 8);
             s->bytes[2u + 2u * k] = (uint8_t)ao[k];
         }
+        if (s->out_bytes == 1u)
+            s->bytes[1] = s->bytes[2];
         send(c, index, PUT, 1u + s->out_bytes);
     } else if (s->in_bytes != 0u) {
         s->put = true;
@@ -170,8 +172,8 @@ static void whole(asi_ctt_t *c, unsigned index)
     case GET: {
         const unsigned n = words(c, index, s->in_bytes);
         for (unsigned k = 0; k < n; k++) {
-            const unsigned high = s->bytes[2u * k], low = s->bytes[2u * k + 1u];
-            asi_ctt_show(c, index, k, high << 8 | (s->in_bytes == 1u ? 0u : low), true);
+            const unsigned byte0 = s->bytes[2u * k], byte1 = s->bytes[2u * k + 1u];
+            asi_ctt_show(c, index, k, s->in_bytes == 1u ? byte0 : byte0 << 8 | byte1, true);
         }
         break;
     }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/** @file asi_ctt3.c  Combined transaction type 3: multiplexed bits of A/B slaves, S-7.A.7 (4 I/O) and S-7.A.A (8 I/O). */
+/** @file asi_ctt3.c  Combined transaction type 3: multiplexed bits of A/B slaves, S-7.A.7 (4 I/O), S-7.A.A (8 I/O). */
 #include "asi_ctt_private.h"
 
 #define LINE (ASI_CTT3_INVERT_OUT ? 3u : 0u)

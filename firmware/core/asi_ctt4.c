@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
  * @file asi_ctt4.c  Combined transaction type 4: a placeholder, as its wire format is not public; off unless
- * ASI_CTT4_ENABLE. The call names a nibble of the value (and the channel, S-7.A.9, or carries the output, S-7.A.8), the answer
- * is that nibble. A call whose nibble was not the one meant brings nothing.
+ * ASI_CTT4_ENABLE. The call names a nibble of the value (and the channel, S-7.A.9, or carries the output, S-7.A.8), the
+ * answer is that nibble. A call whose nibble was not the one meant brings nothing.
  */
 #include "asi_ctt_private.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file asi_ctt5.c  Kinds whose calls are ordinary ones: groups of 2 to 4 addresses of combined transaction type 5, and safety
- * slaves. Both are looked at once, when the calls of a cycle are over.
+ * @file asi_ctt5.c  Kinds whose calls are ordinary ones: groups of 2 to 4 addresses of combined transaction type 5, and
+ * safety slaves. Both are looked at once, when the calls of a cycle are over.
  */
 #include "asi_ctt_private.h"
 

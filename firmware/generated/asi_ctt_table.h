@@ -70,13 +70,13 @@
 #ifndef ASI_CTT1_SEQUENCE_TRIPLES
 #define ASI_CTT1_SEQUENCE_TRIPLES 8
 #endif
-/** experimental: S-7.1: triples of a value, 2 .. 6, without E triple: 13 data bits, O, V, left-aligned */
+/** experimental: S-7.1: triples of a value with its E triple, 3 .. 7 (6 .. 18 bits beside E), left-aligned */
 #ifndef ASI_CTT1_TRIPLES_71
-#define ASI_CTT1_TRIPLES_71 5
+#define ASI_CTT1_TRIPLES_71 7
 #endif
-/** experimental: S-7.2: triples of a value, 2 .. 6, without E triple: 16 data bits, O, V */
+/** experimental: S-7.2: the same */
 #ifndef ASI_CTT1_TRIPLES_72
-#define ASI_CTT1_TRIPLES_72 6
+#define ASI_CTT1_TRIPLES_72 7
 #endif
 /** ms since the last value taken by an output slave until OV is 0 */
 #ifndef ASI_CTT1_OUTPUT_MS

@@ -153,8 +153,8 @@ class Ctt1:
             else:
                 value, overflow, valid = self.feed(self.channel)
                 e = bits(self.channel, 3)
-                data = bits(value, 16)[:3 * min(self.n, 6) - 2]
-                self.frame = (e[::-1] if self.p["CTT1_E_REVERSED"] else e) * (self.n == 7) + data + [overflow, valid]
+                data = bits(value, 16)[:3 * (self.n - 1) - 2]
+                self.frame = (e[::-1] if self.p["CTT1_E_REVERSED"] else e) + data + [overflow, valid]
                 self.channel = (self.channel + 1) % self.channels
             assert len(self.frame) == 3 * self.n
         return self.frame[3 * wanted[0]:3 * wanted[0] + 3] or [0, 0, 0]
@@ -171,9 +171,9 @@ class Ctt1:
             if not word & 2:
                 self.written = self.buffer
             return
-        e = self.frame[:3] if self.n == 7 else [0, 0, 0]
+        e = self.frame[:3]
         channel = int("".join(map(str, e[::-1] if self.p["CTT1_E_REVERSED"] else e)), 2)
-        data = self.frame[3 if self.n == 7 else 0:-2]
+        data = self.frame[3:-2]
         value = int("".join(map(str, data)), 2) << (16 - len(data))
         if self.frame[-1]:
             self.values.setdefault(channel, []).append(value)

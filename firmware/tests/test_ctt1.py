@@ -197,20 +197,22 @@ def test_alternatives(name, value, output):
     assert slave.written == bytes([0, 1, 2 | 3, 3, 4, 7, 6, 7, 9])
 
 
-@pytest.mark.parametrize("codes, triples", [(0x8F17, 5), (0x8F27, 6)])
-def test_shorter_values(codes, triples):
-    """CT-015: S-7.1 and S-7.2: 5 and 6 triples, no E triple, left-aligned; in and out."""
-    line = Line(setup(), 3, codes, Ctt1(triples=triples, feed=feeder([0xFEDC])))
+@pytest.mark.parametrize("triples", range(3, 8))
+@pytest.mark.parametrize("id_", [1, 2])
+def test_shorter_values(id_, triples):
+    """CT-015: S-7.1 and S-7.2 with 3 .. 7 triples a value, left-aligned, two channels, in and out; not transparent."""
+    env = setup(f"ASI_CTT1_TRIPLES_7{id_}={triples}") if triples < 7 else setup()
+    line = Line(env, 3, 0x9F07 | id_ << 4, Ctt1(channels=2, triples=triples, feed=lambda channel: (0xFEDC >> channel, 0, 1)))
     line.run(triples - 1)
     assert line.ai[0] == 0x7FFF
-    line.call()
-    mask = 0xFFFF << (18 - 3 * triples) & 0xFFFF
-    assert line.ai[0] == 0xFEDC & mask and line.status == TV | 1
-    slave = Ctt1(output=True, triples=triples)
-    line = Line(setup(), 3, codes & 0x0FFF, slave)
-    line.set_ao(0x8421)
-    line.run(2 * triples)
-    assert slave.values == {0: [0, 0x8421 & mask]}
+    line.run(1 + triples)
+    mask = 0xFFFF << 3 * (7 - triples) & 0xFFFF
+    assert line.ai[:2] == [0xFEDC & mask, 0x7F6E & mask] and line.status == TV | 3
+    slave = Ctt1(output=True, channels=2, triples=triples)
+    line = Line(env, 3, 0x1F07 | id_ << 4, slave)
+    line.set_ao(0x8421, 0xFFFF)
+    line.run(3 * triples)
+    assert slave.values == {0: [0, 0x8421 & mask], 1: [mask]}
 
 
 # ---------------------------------------------------------------- strings
