@@ -233,6 +233,13 @@ bool asi_ctt1_hold(asi_ctt_t *c, unsigned index)
     return s->mode == HELD && s->quiet;
 }
 
+/** Digits of base 4 add up to a multiple of 3, for n up to 255: the core cannot divide. */
+static bool is_multiple_of_3(unsigned n)
+{
+    const unsigned sum = (n & 3u) + (n >> 2 & 3u) + (n >> 4 & 3u) + (n >> 6 & 3u);
+    return (0x1249u >> sum & 1u) != 0u;
+}
+
 asi_status_t asi_ctt1_string(asi_ctt_t *c, unsigned index, asi_string_kind_t kind, unsigned length, uint32_t now_us)
 {
     asi_ctt1_t *s = &c->slave[index].one;
@@ -241,12 +248,9 @@ asi_status_t asi_ctt1_string(asi_ctt_t *c, unsigned index, asi_string_kind_t kin
     if (s->mode != HELD || !s->quiet)
         return ASI_E_STATE;
     if (kind == ASI_STRING_WRITE) {
-        unsigned rest = length;
         if (length > ASI_CTT1_STRING_BYTES)
             return ASI_E_OVERFLOW;
-        while (rest >= 3u) /* no division here */
-            rest -= 3u;
-        if (length == 0u || rest != 0u)
+        if (length == 0u || !is_multiple_of_3(length))
             return ASI_E_ARG;
         c->string.position = 0u;
         c->string.length = (uint16_t)length;

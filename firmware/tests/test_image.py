@@ -30,7 +30,7 @@ def test_magic_comes_last():
             break
         chip.lib.soc_clocks(1)
     window = [chip.window[k] for k in range(0x2C0 // 4)]
-    assert chip.read("VERSION") == 0x00010000 and chip.read("HOST_CTRL") == 4 and chip.list("LPS_CFG") == set()
+    assert chip.read("VERSION") == 0x00020000 and chip.read("HOST_CTRL") == 4 and chip.list("LPS_CFG") == set()
     assert chip.item("CDI", 63, 2) == chip.item("PCD", 0, 2) == 0xFFFF and chip.item("PP", 7, 1) == 15
     assert chip.read("PHASE") == 0 and chip.read("HOST_SEQ") == chip.read("FW_SEQ") == 0
     chip.run()
