@@ -4,7 +4,7 @@ FW       := $(BUILD)/firmware
 FW_CC    := $(VPY) -m ziglang cc
 # generic_rv32 is RV32I; -fno-builtin keeps memset from calling itself; address 0 is RAM, hence the null-pointer flag
 FW_FLAGS := -target riscv32-freestanding-none -mcpu=generic_rv32 -mabi=ilp32 -std=c17 -Os -fno-unroll-loops -mno-relax \
-            -ffreestanding -fno-builtin -fno-sanitize=all -fno-delete-null-pointer-checks \
+            -g -ffreestanding -fno-builtin -fno-sanitize=all -fno-delete-null-pointer-checks \
             -ffunction-sections -fdata-sections \
             -Wall -Wextra -Wconversion -Wshadow -Werror -Wframe-larger-than=256 -Wvla \
             $(addprefix -Ifirmware/,hal/include core hal app generated)

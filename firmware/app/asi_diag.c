@@ -61,21 +61,23 @@ static void show_telegrams(void)
     WIN(RING_LOST)[0] = dropped + hal_monitor_lost();
 }
 
-/** Attempts since the last copy of this index, for the suspicion of duplicate addresses. */
-static void judge(asi_ec_t *ec, volatile uint32_t *shown)
+/** The statistics of an index to the window; what is new of them to the core, for the suspicion of duplicates. */
+static void show_statistics(asi_ec_t *ec, volatile uint32_t *shown)
 {
-    uint32_t before[ASI_ERR_EARLY], garbled = 0;
-    for (unsigned k = 0; k < ASI_ERR_EARLY; k++)
-        before[k] = shown[k];
-    hal_stat(stat_index, shown);
-    for (unsigned k = ASI_ERR_START; k < ASI_ERR_EARLY; k++)
-        garbled += shown[k] - before[k];
-    const uint32_t good = shown[ASI_ERR_OK] - before[ASI_ERR_OK];
-    const uint32_t silent = shown[ASI_ERR_NO_RESPONSE] - before[ASI_ERR_NO_RESPONSE];
-    if (garbled == 0u && good == 0u)
+    const volatile uint32_t *counted = hal_stat(stat_index);
+    uint32_t news[3] = {0, 0, 0}; /* good, silent, garbled */
+    for (unsigned k = 0; k < HAL_STAT_WORDS; k++) {
+        const uint32_t value = counted[k];
+        if (value != shown[k]) {
+            if (k < ASI_ERR_EARLY)
+                news[k < 2u ? k : 2u] += value - shown[k];
+            shown[k] = value;
+        }
+    }
+    if (news[0] == 0u && news[2] == 0u)
         return; /* nothing that could change anything */
     hal_irq_off();
-    asi_ec_quality(ec, stat_index, good, silent, garbled);
+    asi_ec_quality(ec, stat_index, news[0], news[1], news[2]);
     hal_irq_on();
 }
 
@@ -88,6 +90,6 @@ void asi_diag_serve(asi_ec_t *ec)
         return;
     last_us = now;
     WIN(LINE_FAULTS)[0] = hal_line_faults();
-    judge(ec, WIN(STAT) + HAL_STAT_WORDS * stat_index);
+    show_statistics(ec, WIN(STAT) + HAL_STAT_WORDS * stat_index);
     stat_index = (stat_index + 1u) % ASI_INDICES;
 }

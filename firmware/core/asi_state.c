@@ -47,8 +47,10 @@ unsigned ec_parameter(const asi_ec_t *ec, unsigned index)
 
 unsigned ec_auto_clear_cause(const asi_ec_t *ec)
 {
-    const asi_list_t missing = asi_list_without(&ec->permanent.projection.lps, &ec->state.lds);
     unsigned index = ASI_INDICES;
+    if (ec->permanent.auto_clear == ASI_AUTO_CLEAR_OFF)
+        return index;
+    const asi_list_t missing = asi_list_without(&ec->permanent.projection.lps, &ec->state.lds);
     if (ec->permanent.auto_clear & ASI_AUTO_CLEAR_MISSING)
         index = asi_list_next(&missing, 0u);
     if (index == ASI_INDICES && (ec->permanent.auto_clear & ASI_AUTO_CLEAR_FAULT))

@@ -14,7 +14,8 @@ _Static_assert(HAL_CYCLE_DONE == ASI_REGS__EVENT__CYCLE_DONE_bm && HAL_BATCH_DON
 static uint32_t ctrl;      /* CTRL as written */
 static asi_list_t slots;   /* SLOT.active as written */
 static uint32_t wanted;    /* events that raise the interrupt */
-static uint32_t live_mask[ASI_IMAGE_WORDS]; /* nibbles of live slots */
+static asi_list_t live_slots;
+static uint32_t live_mask[ASI_IMAGE_WORDS]; /* their nibbles */
 static unsigned batch_len;
 static asi_result_t results[ASI_INDICES];
 
@@ -74,10 +75,17 @@ void asi_port_cycle(const asi_cycle_mode_t *mode)
 
 void asi_port_slot(unsigned index, bool active, bool extended, bool live)
 {
-    const uint32_t nibble = 15u << asi_shift(index);
-    live_mask[asi_word(index)] &= ~nibble;
-    if (live)
-        live_mask[asi_word(index)] |= nibble;
+    if (live != asi_list_has(&live_slots, index)) {
+        live_mask[asi_word(index)] ^= 15u << asi_shift(index);
+        if (live)
+            asi_list_add(&live_slots, index);
+        else
+            asi_list_remove(&live_slots, index);
+        /* without one the core is spared an interrupt per cycle */
+        wanted = asi_list_is_empty(&live_slots) ? HAL_ALL_EVENTS & ~(uint32_t)HAL_EXCHANGE_DONE : HAL_ALL_EVENTS;
+        if (REG(EVENT_EN) != 0u)
+            REG(EVENT_EN) = wanted;
+    }
     if (active) {
         asi_list_add(&slots, index);
         LINK(SLOT_STATE)[index] = 0; /* before active: the sequencer skips a slot with a full streak */
@@ -86,12 +94,6 @@ void asi_port_slot(unsigned index, bool active, bool extended, bool live)
     }
     LINK(SLOT)[index] = (active ? SLOT_R__ACTIVE_bm : 0u) | (extended ? SLOT_R__EXTENDED_bm : 0u) |
                         (live ? SLOT_R__LIVE_bm : 0u);
-    uint32_t any = 0;
-    for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++)
-        any |= live_mask[w];
-    wanted = any ? HAL_ALL_EVENTS : HAL_ALL_EVENTS & ~HAL_EXCHANGE_DONE; /* spares the core an interrupt per cycle */
-    if (REG(EVENT_EN) != 0u)
-        REG(EVENT_EN) = wanted;
 }
 
 void asi_port_live(unsigned index, unsigned nibble)
@@ -232,21 +234,14 @@ hal_counters_t hal_counters(void)
                             .failed = LINK(FAILED)[0]};
 }
 
-static void read_stat(uint32_t base, unsigned index, volatile uint32_t words[HAL_STAT_WORDS])
+const volatile uint32_t *hal_stat(unsigned index)
 {
-    const volatile uint32_t *from = (const volatile uint32_t *)(base + 4u * HAL_STAT_WORDS * index);
-    for (unsigned w = 0; w < HAL_STAT_WORDS; w++)
-        words[w] = from[w];
+    return (const volatile uint32_t *)(ASI_STATS_BASE + 4u * HAL_STAT_WORDS * index);
 }
 
-void hal_stat(unsigned index, volatile uint32_t words[HAL_STAT_WORDS])
+const volatile uint32_t *hal_stat_take(unsigned index)
 {
-    read_stat(ASI_STATS_BASE, index, words);
-}
-
-void hal_stat_take(unsigned index, volatile uint32_t words[HAL_STAT_WORDS])
-{
-    read_stat(ASI_STATS_CLEAR_BASE, index, words);
+    return (const volatile uint32_t *)(ASI_STATS_CLEAR_BASE + 4u * HAL_STAT_WORDS * index);
 }
 
 uint32_t hal_line_faults(void)

@@ -41,10 +41,11 @@ asi_list_t hal_lost_slaves(void);
 bool hal_apf(void);
 hal_counters_t hal_counters(void);
 enum { HAL_STAT_WORDS = 16 };
-/** Statistics of an index, words of stat_r in rdl/asi.rdl; each word is right, two of them may be an attempt apart. */
-void hal_stat(unsigned index, volatile uint32_t words[HAL_STAT_WORDS]);
-/** The same, and every word is 0 afterwards; no count is lost (ST-004). */
-void hal_stat_take(unsigned index, volatile uint32_t words[HAL_STAT_WORDS]);
+/** Statistics of an index, HAL_STAT_WORDS words of stat_r in rdl/asi.rdl; each word is right, two of them may be an attempt
+ * apart. */
+const volatile uint32_t *hal_stat(unsigned index);
+/** The same, and reading a word clears it; no count is lost (ST-004). */
+const volatile uint32_t *hal_stat_take(unsigned index);
 /** Line faults: bits 0..2 actual, 8..10 latched: APF, earth fault, jabber (LT-017). */
 uint32_t hal_line_faults(void);
 /** Forget the latched line faults; what is still there comes back at once. */

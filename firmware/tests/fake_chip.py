@@ -121,21 +121,26 @@ class Chip:
         slot, state, out, work, img = (link_at(n) // 4 for n in ("SLOT", "SLOT_STATE", "OUT_IMG", "IN_WORK", "IN_IMG"))
         events, start = CYCLE_DONE, self.r.skipped_us
         for number in range(1, 32):
-            a, b = (self.link[slot + i] & 1 and self.link[state + i] >> 16 < 3 for i in (number, number + 32))
+            a, b = (self.link[slot + i] & 1 and (self.link[state + i] >> 16 & 7) < 3 for i in (number, number + 32))
             if not a and not b:
                 continue
             i = number + 32 * bool(b and (not a or self.cycle_number & 1))
             nibble = self.link[out + i // 8] >> i % 8 * 4 & 15
             if self.link[slot + i] & 2:
                 nibble = nibble & 7 | (0 if i > 31 else 8)
-            result = self.request(1 << 12 | number << 5 | nibble)
+            call = number << 5 | nibble
+            if self.r.ctrl & 16:  # LK-021
+                call = 0x400 | number << 5 | 0x11 ^ (8 if i > 31 else 0)
+            result = self.request(1 << 12 | call)
+            books = (call & 15) << 20 | (self.link[state + i] + (1 << 28)) & 0xF000_0000
             value = self.link[work + i // 8]
             if result >> 4 & 15 == OK:
-                self.link[state + i] = result & 15
+                self.link[state + i] = result & 15 | books
                 value = value & ~(15 << i % 8 * 4) | (result & 15) << i % 8 * 4
             else:
-                self.link[state + i] += 1 << 16
-                if self.link[state + i] >> 16 == 3:
+                streak = (self.link[state + i] >> 16 & 7) + 1
+                self.link[state + i] = self.link[state + i] & 15 | result & 0xF0 | streak << 16 | books
+                if streak == 3:
                     events |= SLAVE_LOST
                     value &= ~(15 << i % 8 * 4)
             self.link[work + i // 8] = value & 0xFFFFFFFF
