@@ -400,6 +400,8 @@ module asi_seq
       Atomic_A:   assert (state_q != StCopy || mem_req_o);  // no free clock for the core inside a copy
       Events_A:   assert (!(cycle_done_o && is_batch) && !(batch_done_o && !is_batch));
       Published_A: assert (!cycle_done_o || !open_q);
+      Exchange_A: assert (!exchange_done_o || (is_dexg && !open_q && !aborted));
+      Carry_A:    assert (!inc || !inc_calls);          // SLOT_STATE.calls counts alone
       Begin_C:    cover (begun);
       Lost_C:     cover (slave_lost_o);
       OnlyLost_C: cover (state_q == StInWr && lost_q && cur_q == nxt_q && nxt_v_q);
