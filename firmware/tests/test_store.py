@@ -112,7 +112,7 @@ def test_one_at_a_time(s):
     while s.lib.st_serve(0):
         pass
     assert s.now.saved and s.now.longest_step <= PAGE + 8 * 4  # page, command and address of eight reads
-    assert s.now.steps < 120
+    assert s.now.steps < 180
     assert s.holds(1, OPAQUE)
 
 
