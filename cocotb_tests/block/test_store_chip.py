@@ -32,7 +32,8 @@ def program(tmp_path_factory):
                FIRMWARE / "hal/asi_flash.c", FIRMWARE / "core/asi_store.c", ROOT / "cocotb_tests/block/store_probe.c"]
     subprocess.run([sys.executable, "-m", "ziglang", "cc", *FLAGS,
                     *(f"-I{FIRMWARE / d}" for d in ("hal/include", "core", "hal", "app", "generated")),
-                    "-T", str(FIRMWARE / "hal/firmware.ld"), *map(str, sources), "-o", str(out / "probe.elf")], check=True)
+                    "-T", str(FIRMWARE / "hal/firmware.ld"), *map(str, sources), "-o", str(out / "probe.elf")],
+                   check=True)
     subprocess.run([sys.executable, str(ROOT / "tools/elf2hex.py"), str(out / "probe.elf"), "--hex",
                     str(out / "probe.hex")], check=True, stdout=subprocess.DEVNULL)
     return out / "probe.hex"

@@ -167,7 +167,7 @@ static bool is_rejected(const uint32_t *rejected, unsigned n, uint32_t address)
     return false;
 }
 
-/** Newest record that is not rejected. @return with good = false: none; blank then tells that there is nothing at all */
+/** Newest record that is not rejected. @return good = false: none; blank then tells that there is nothing at all */
 static header_t find_newest(const uint32_t *rejected, unsigned n)
 {
     header_t best = {.good = false, .blank = true};
@@ -350,6 +350,8 @@ void asi_store_serve(asi_store_t *s, uint32_t now_us)
 
     switch ((step_t)s->step) {
     case ERASE: /* also when it reads as blank: a broken off erase can do so and forget later */
+        if (!has_ended(s, now_us, ASI_STORE_ERASE_US))
+            break; /* of a sector given up: a busy flash would not hear the erase */
         asi_flash_erase(sector);
         s->since_us = now_us;
         s->position = 0;

@@ -11,3 +11,6 @@ def pytest_sessionfinish():
     import native
     if native.load.cache_info().currsize:
         native.load()[1].fw_counters_write()
+    import native_store
+    if native_store.load.cache_info().currsize:
+        native_store.load()[1].st_counters_write()

@@ -234,8 +234,8 @@ def test_worn_sectors_are_skipped(s, kind):
 
 
 def test_worn_out(s):
-    """NV-004, NV-005: when four sectors in a row fail the store has failed, what was stored is still there, and the next
-    request goes on behind them."""
+    """NV-004, NV-005: when four sectors in a row fail the store has failed, what was stored is still there, and the
+    next request goes on behind them."""
     s.store(1)
     s.start()
     for k in range(1, 6):
@@ -323,7 +323,7 @@ def filled(s):
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 7), st.integers(0, 3699), st.integers(1, 255)), max_size=20))
 def test_spoilt_records(flips):
-    """NV-003, NV-005: the newest record without a wrong bit wins, wherever the others are spoilt; then a store works."""
+    """NV-003, NV-005: the newest record without a wrong bit wins, whatever is spoilt elsewhere; a store works."""
     s = Store()
     sets = filled(s)
     area, spoilt = s.area(), set()
@@ -441,8 +441,8 @@ def test_defaults(s):
 
 
 def test_request(s):
-    """NV-001, NV-006, NV-009: a request is stored step by step and in use after the next start; equal data is not stored
-    again."""
+    """NV-001, NV-006, NV-009: a request is stored step by step and in use after the next start; equal data is not
+    stored again."""
     s.lib.st_persist_open()
     s.lib.st_persist_request(5)
     assert word(s) == (EMPTY, BUSY, 0)
