@@ -321,7 +321,8 @@ def filled(s):
 
 
 @settings(max_examples=150, deadline=None)
-@given(st.lists(st.tuples(st.integers(0, 7), st.integers(0, 3699), st.integers(1, 255)), max_size=20))
+@given(st.lists(st.tuples(st.integers(0, 7), st.one_of(st.integers(0, 15), st.integers(0, 3699)), st.integers(1, 255)),
+                max_size=20))
 def test_spoilt_records(flips):
     """NV-003, NV-005: the newest record without a wrong bit wins, whatever is spoilt elsewhere; a store works."""
     s = Store()
@@ -341,6 +342,17 @@ def test_spoilt_records(flips):
         assert s.now.state == CORRUPT
     s.store(99, 300)
     assert s.holds(99, 300)
+
+
+@pytest.mark.parametrize("byte,bits", [(0, 1), (4, 1), (8, 1), (9, 2), (10, 1), (12, 1)])
+def test_spoilt_header(s, byte, bits):
+    """NV-003: a record whose header is wrong, its length too, does not hide the newer one behind it."""
+    s.store(1)
+    s.store(2)
+    area = s.area()
+    area[byte] ^= bits
+    s.set_area(area)
+    assert s.holds(2)
 
 
 @settings(max_examples=60, deadline=None)
