@@ -89,7 +89,8 @@ private:
         bool operator==(const Watched &) const = default;
     };
     Watched sample() const {
-        return {top->tx_man_o, top->tx_en_o, top->phase_o, top->sync_o, top->core_wait_o, top->spi_cs_no, top->spi_sck_o};
+        return {top->tx_man_o,    top->tx_en_o,   top->phase_o, top->sync_o,
+                top->core_wait_o, top->spi_cs_no, top->spi_sck_o};
     }
     void outputs_changed(const Watched &next);
     void spi_changed(const Watched &next);

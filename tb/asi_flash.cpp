@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// asi_flash.cpp: see asi_flash.h. A program or erase takes effect when its time is over, or anyhow when power fails first.
+// asi_flash.cpp: see asi_flash.h. A program or erase takes effect when its time is over, anyhow when power fails first.
 #include "asi_flash.h"
 
 #include <stdlib.h>
@@ -8,8 +8,8 @@
 namespace {
 constexpr uint8_t kId[2] = {0xEF, 0x40};
 enum : uint8_t {
-    kProgram = 0x02, kRead = 0x03, kWriteDisable = 0x04, kStatus = 0x05, kWriteEnable = 0x06, kErase = 0x20, kReadId = 0x9F,
-    kWake = 0xAB, kSleep = 0xB9, kIgnored = 0x00
+    kProgram = 0x02, kRead = 0x03, kWriteDisable = 0x04, kStatus = 0x05, kWriteEnable = 0x06, kErase = 0x20,
+    kReadId = 0x9F, kWake = 0xAB, kSleep = 0xB9, kIgnored = 0x00
 };
 
 uint32_t hash(uint32_t x) {
@@ -54,8 +54,8 @@ void asi_flash::wear_out() {
     if (kind == 2 && op_ == Op::Program) cell[op_address_] = 0xFF;
 }
 
-/// Power has failed in it. Program: few, half, nearly all or all of the zeros are there; erase: in the preparing write of
-/// zeros, anything, nearly blank, blank, or only begun. Cells between 0 and 1 are in doubt.
+/// Power has failed in it. Program: few, half, nearly all or all of the zeros are there; erase: in the preparing write
+/// of zeros, anything, nearly blank, blank, or only begun. Cells between 0 and 1 are in doubt.
 void asi_flash::tear() {
     const uint32_t how = dice() % (op_ == Op::Program ? 4 : 5);
     const uint32_t n = op_ == Op::Program ? kPage : kSector;
@@ -67,7 +67,7 @@ void asi_flash::tear() {
         if (op_ == Op::Program) {
             const uint8_t zeros = uint8_t(cells & ~page_[k]);
             const uint8_t done = uint8_t(how == 0 ? 0 : how == 1 ? zeros & a : zeros);
-            const uint8_t open = uint8_t(how == 0 ? zeros & a & b : how == 1 ? zeros & ~a & b : how == 2 ? zeros & a & b : 0);
+            const uint8_t open = uint8_t(how == 1 ? zeros & ~a & b : how == 3 ? 0 : zeros & a & b);
             doubts = uint8_t((doubts & ~done) | open);
             cells = uint8_t(cells & ~done);
         } else {
@@ -107,8 +107,8 @@ void asi_flash::take(int64_t t, uint8_t in) {
     settle(t);
     if (taken_ == 0) {
         command_ = in;
-        const bool known = in == kProgram || in == kRead || in == kWriteDisable || in == kStatus || in == kWriteEnable ||
-                           in == kErase || in == kReadId || in == kWake || in == kSleep;
+        const bool known = in == kProgram || in == kRead || in == kWriteDisable || in == kStatus ||
+                           in == kWriteEnable || in == kErase || in == kReadId || in == kWake || in == kSleep;
         if (!known || (deep_ && in != kWake) || (op_ != Op::None && in != kStatus)) command_ = kIgnored;
     } else if (taken_ < 4) {
         address_ = (address_ << 8 | in) & (size - 1);

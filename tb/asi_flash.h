@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// @file asi_flash.h  SPI NOR flash model, behind asi_flash of asi_tb.h. Uses the C library only, so that the firmware's
-/// native tests can link it without a C++ run time. Its twin in Python: cocotb_tests/models/flash.py. Requirement: NV-008.
+/// @file asi_flash.h  SPI NOR flash model, behind asi_flash of asi_tb.h. Uses the C library only, so that the native
+/// tests of the firmware link it without a C++ run time. Its twin: cocotb_tests/models/flash.py. Requirement: NV-008.
 #ifndef ASI_TB_FLASH_H
 #define ASI_TB_FLASH_H
 #include "asi_tb.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file asi_tb.h  C interface of the native simulation: simulated slaves on a line, the Verilated chip with them, a flash.
+ * @file asi_tb.h  C interface of the native simulation: slaves on a line, the Verilated chip with them, a flash.
  * Used from Python through cffi (host/python/asi/native.py, which reads the declarations between the cffi markers).
  * Units: times in ns of bus time since reset (int64_t); indices as in docs/architecture.md (number + 32 * Sel).
  * Errors: functions returning int give 0 or a count on success, a negative number on failure.
@@ -121,16 +121,16 @@ typedef struct {
 asi_flash *asi_flash_new(uint32_t bytes);            /* erased; bytes: a power of 2, 64 KB .. 16 MB. NULL: refused */
 void     asi_flash_free(asi_flash *flash);           /* after the chip it is attached to */
 int      asi_flash_load(asi_flash *flash, uint32_t address, const uint8_t *bytes, uint32_t n);
-int      asi_flash_peek(const asi_flash *flash, uint32_t address, uint8_t *bytes, uint32_t n);  /* doubtful cells: as they tend */
-int      asi_flash_doubt(const asi_flash *flash, uint32_t address, uint8_t *bytes, uint32_t n); /* their bits are 1 */
+int      asi_flash_peek(const asi_flash *flash, uint32_t address, uint8_t *bytes, uint32_t n);   /* as cells tend */
+int      asi_flash_doubt(const asi_flash *flash, uint32_t address, uint8_t *bytes, uint32_t n);  /* 1: in doubt */
 void     asi_flash_copy(asi_flash *to, const asi_flash *from);                 /* all of it; equal sizes */
 void     asi_flash_times(asi_flash *flash, int64_t program_ns, int64_t erase_ns);  /* default 0.4 ms, 45 ms */
 void     asi_flash_cut_after(asi_flash *flash, int64_t bytes, uint32_t seed);  /* power fails after so many more bytes;
                                                                  -1: never. seed: of what is left of an operation */
 int      asi_flash_is_dead(const asi_flash *flash);  /* 1: power has failed */
 void     asi_flash_power_up(asi_flash *flash);       /* off and on again; time starts at 0 */
-int      asi_flash_worn(asi_flash *flash, uint32_t address, int kind);  /* a sector: 1 erases leave a bit, 2 a page's first
-                                                                 byte does not take zeros, 0 good again */
+int      asi_flash_worn(asi_flash *flash, uint32_t address, int kind);         /* a sector: 1 erases leave a bit, 2 a
+                                                                 page's first byte takes no zeros, 0 good again */
 void     asi_flash_get_counts(const asi_flash *flash, asi_flash_counts *counts);
 uint32_t asi_flash_erases(const asi_flash *flash, uint32_t address);           /* of the sector there */
 /* the two ways to talk to it, not mixed within a frame: whole bytes, or pins (-> MISO). Times do not go back */
@@ -151,7 +151,7 @@ uint32_t  asi_chip_host_read(asi_chip *chip, uint32_t byte_addr);               
 void      asi_chip_host_write(asi_chip *chip, uint32_t byte_addr, uint32_t data, uint8_t byte_enable);
 void      asi_chip_apf(asi_chip *chip, uint8_t low);           /* pin apf_ni; the slaves follow asi_net_power */
 void      asi_chip_efault(asi_chip *chip, uint8_t fault);      /* pin efault_i */
-void      asi_chip_attach_flash(asi_chip *chip, asi_flash *flash);  /* powers it up on the SPI pins; NULL: none (MISO 1) */
+void      asi_chip_attach_flash(asi_chip *chip, asi_flash *flash);  /* powers it up; NULL: none, MISO is 1 */
 int       asi_chip_log(asi_chip *chip, asi_telegram *out, int max);                     /* as asi_net_log */
 void      asi_chip_get_stats(asi_chip *chip, asi_chip_stats *out);
 /* cffi end */

@@ -3,46 +3,14 @@ import os
 import struct
 
 import cocotb
-from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
+from cocotb.triggers import ClockCycles, RisingEdge
 
 from cocotb_tests.block.cocotb_master import MasterTB
 from cocotb_tests.block.cocotb_soc import ALIVE
+from cocotb_tests.models.flash import Flash, bind
 
 FLASH_OFFSET, FLASH_MAGIC = 0x10_0000, 0x4249_5341                 # header of the image: firmware/boot/boot.c
-READ = 0x03
-
-
-class Flash:
-    """SPI NOR flash, mode 0: answers READ with a 24-bit address. content begins at byte address `base`."""
-
-    def __init__(self, dut, base, content):
-        self.dut, self.base, self.content = dut, base, content
-        self.bits, self.head, self.reads = 0, 0, 0                 # bits of this frame, first four bytes, bytes read
-        for run in (self._select, self._rise, self._fall):
-            cocotb.start_soon(run())
-
-    async def _select(self):
-        while True:
-            await FallingEdge(self.dut.spi_cs_no)
-            self.bits, self.head = 0, 0
-
-    async def _rise(self):
-        while True:
-            await RisingEdge(self.dut.spi_sck_o)
-            if self.bits < 32:
-                self.head = self.head << 1 | int(self.dut.spi_mosi_o.value)
-            self.bits += 1
-
-    async def _fall(self):
-        while True:
-            await FallingEdge(self.dut.spi_sck_o)
-            if self.bits < 32 or self.head >> 24 != READ:
-                continue
-            byte, bit = divmod(self.bits - 32, 8)
-            offset = (self.head & 0xFFFFFF) - self.base + byte
-            value = self.content[offset] if 0 <= offset < len(self.content) else 0xFF
-            self.dut.spi_miso_i.value = value >> (7 - bit) & 1
-            self.reads += bit == 7
+WAKE_AND_READ = 1 + 4                                              # bytes on SPI before the first one of the image
 
 
 def image():
@@ -74,13 +42,14 @@ class BootTB(MasterTB):
 
 @cocotb.test(timeout_time=500, timeout_unit="ms")
 async def from_flash(dut):
-    """HW-007: the boot ROM copies the program from flash to RAM, reads nothing else, and starts it."""
+    """HW-007, NV-007: the boot ROM wakes the flash, copies the program to RAM, reads nothing else, and starts it."""
     content = image()
     tb = BootTB(dut)
-    flash = Flash(dut, FLASH_OFFSET, content)
+    flash = bind(dut, Flash())
+    flash.load(FLASH_OFFSET, content)
     await tb.reset()
-    assert await tb.alive(200_000), f"not started; {flash.reads} of {len(content)} bytes read"
-    assert flash.reads == len(content) and int(dut.spi_cs_no.value) == 1
+    assert await tb.alive(200_000), f"not started; {flash.bytes} bytes on SPI for {len(content)}"
+    assert flash.counts() == (WAKE_AND_READ + len(content), 0, 0, 0) and int(dut.spi_cs_no.value) == 1
     assert await tb.peek(0) == struct.unpack_from("<I", content, 16)[0]
 
 
@@ -89,12 +58,13 @@ async def damaged_flash(dut):
     """HW-007: an image with one wrong bit, in header, sums or program, is not started; a good one is, next try."""
     content = image()
     tb = BootTB(dut)
-    flash = Flash(dut, FLASH_OFFSET, content)
+    flash = bind(dut, Flash())
     for byte in (0, 4, 8, 12, 16, len(content) - 1):
         bad = bytearray(content)
         bad[byte] ^= 0x10
-        flash.content, flash.reads = bytes(bad), 0
+        flash.load(FLASH_OFFSET, bad)
+        flash.bytes = 0
         await tb.reset()
-        assert not await tb.alive(80_000) and flash.reads >= 16, f"byte {byte}"
-    flash.content = content
+        assert not await tb.alive(80_000) and flash.bytes >= WAKE_AND_READ + 16, f"byte {byte}"
+    flash.load(FLASH_OFFSET, content)
     assert await tb.alive(400_000)

@@ -201,7 +201,7 @@ def flat(body):
 @settings(max_examples=300, deadline=None)
 @given(steps=steps, by_pins=st.booleans())
 def test_models_agree(steps, by_pins):
-    """NV-008: random frames, whole and broken, pauses, power cuts: both models answer and end alike, byte or pin-wise."""
+    """NV-008: random frames, whole and broken, pauses, power cuts: both models answer and end alike, by byte or pin."""
     twins = [native.Flash(SIZE), model.Flash(SIZE)]
     t = 0
 

@@ -10,9 +10,9 @@
 #include "asi_permanent.h"
 #include "asi_status.h"
 
-/** Find the flash and read what is stored: once, at start, before the line is on. Takes as long as reading does: some ms.
- * @return the stored data, else defaults: nothing projected, codes FFFF, parameters F, configuration mode, data
- *   exchange on, no automatic addressing, no auto clear. Stays valid and unchanged until the first asi_persist_request */
+/** Find the flash and read what is stored: once, at start, before the line is on. Takes as long as reading does,
+ * some ms. @return the stored data, else defaults: nothing projected, codes FFFF, parameters F, configuration mode,
+ *   data exchange on, no automatic addressing, no auto clear. Stays valid, and unchanged until asi_persist_request */
 const asi_permanent_t *asi_persist_open(void);
 /** Have this stored unless it is what is in flash already. It is copied; it must not change during the call. While a
  * store is under way the newest request waits. After a failed store, or without a flash, nothing is tried again until

@@ -12,13 +12,14 @@ enum {
     FLAG_PROTECTED = 1, FLAG_AUTO_ADDRESS = 2, FLAG_DATA_EXCHANGE = 4, CLEAR_SHIFT = 4, FLAGS_USED = 0x37,
     VERSION = 1,
     CHUNK = 32,       /* bytes read at once */
+    FILL_BYTES = 64,  /* bytes prepared in one step */
 };
 #define MAGIC 0x50495341u /* 'ASIP' */
 #define NONE 0xFFFFFFFFu
 
 _Static_assert(HEADER + AT_OPAQUE + ASI_STORE_OPAQUE + TRAILER <= ASI_FLASH_SECTOR, "a set fits a sector");
 
-typedef enum { IDLE, ERASE, ERASING, BLANK, PROGRAM, PROGRAMMING, VERIFY } step_t;
+typedef enum { IDLE, ERASE, ERASING, BLANK, FILL, PROGRAM, PROGRAMMING, VERIFY } step_t;
 
 /* ------------------------------------------------------------------------------------------ bytes of a record */
 
@@ -97,11 +98,10 @@ static unsigned header_get(const asi_store_t *s, unsigned at)
     return byte_of(at < 4u ? MAGIC : at < 8u ? s->next_sequence : payload | (uint32_t)VERSION << 16, at);
 }
 
-/** Next bytes of the record into store->page. @return their number */
-static unsigned fill_page(asi_store_t *s)
+/** Next bytes of the record into store->page. @return true when the page or the record ends */
+static bool fill_page(asi_store_t *s)
 {
-    unsigned n = 0;
-    for (; n < ASI_FLASH_PAGE && s->position < s->length; n++, s->position++) {
+    for (unsigned n = 0; n < FILL_BYTES && s->position < s->length; n++, s->position++) {
         const unsigned at = s->position;
         unsigned byte;
         if (at >= HEADER_DATA && at < HEADER) { /* not under the CRC itself: a CRC of a CRC forgets what was before */
@@ -112,9 +112,9 @@ static unsigned fill_page(asi_store_t *s)
             byte = at < HEADER_DATA ? header_get(s, at) : payload_get(s->set, at - HEADER);
             s->crc = crc_add(s->crc, byte);
         }
-        s->page[n] = (uint8_t)byte;
+        s->page[at % ASI_FLASH_PAGE] = (uint8_t)byte;
     }
-    return n;
+    return s->position % ASI_FLASH_PAGE == 0u || s->position == s->length;
 }
 
 /* ------------------------------------------------------------------------------------------ start */
@@ -167,7 +167,7 @@ static bool is_rejected(const uint32_t *rejected, unsigned n, uint32_t address)
     return false;
 }
 
-/** Newest record that is not rejected. @return with good = false: none; blank then tells that there is nothing at all */
+/** Newest record that is not rejected. @return good = false: none; blank then tells that there is nothing at all */
 static header_t find_newest(const uint32_t *rejected, unsigned n)
 {
     header_t best = {.good = false, .blank = true};
@@ -250,7 +250,7 @@ static void begin_record(asi_store_t *s, uint32_t address)
     s->at = address;
     s->position = 0;
     s->crc = crc_begin(address);
-    s->step = PROGRAM;
+    s->step = FILL;
 }
 
 /** The newest whole set is never erased. */
@@ -350,6 +350,8 @@ void asi_store_serve(asi_store_t *s, uint32_t now_us)
 
     switch ((step_t)s->step) {
     case ERASE: /* also when it reads as blank: a broken off erase can do so and forget later */
+        if (!has_ended(s, now_us, ASI_STORE_ERASE_US))
+            break; /* of a sector given up: a busy flash would not hear the erase */
         asi_flash_erase(sector);
         s->since_us = now_us;
         s->position = 0;
@@ -367,13 +369,15 @@ void asi_store_serve(asi_store_t *s, uint32_t now_us)
             begin_record(s, sector);
         }
         break;
-    case PROGRAM: {
-        const uint32_t address = s->at + s->position;
-        asi_flash_program(address, s->page, fill_page(s));
+    case FILL:
+        if (fill_page(s))
+            s->step = PROGRAM;
+        break;
+    case PROGRAM:
+        asi_flash_program(s->at + done, s->page, s->position - done);
         s->since_us = now_us;
         s->step = PROGRAMMING;
         break;
-    }
     case PROGRAMMING:
         if (has_ended(s, now_us, ASI_STORE_PROGRAM_US))
             s->step = VERIFY;
@@ -382,7 +386,7 @@ void asi_store_serve(asi_store_t *s, uint32_t now_us)
         if (!reads_as(s, s->at + done, s->position - done, false)) {
             give_up_sector(s);
         } else if (s->position < s->length) {
-            s->step = PROGRAM;
+            s->step = FILL;
         } else {
             s->newest = s->at;
             s->sequence = s->next_sequence;

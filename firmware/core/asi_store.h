@@ -12,7 +12,7 @@
 #include "asi_permanent.h"
 #include "asi_status.h"
 
-#define ASI_STORE_OPAQUE 3200u /**< bytes of host data kept with the set: bus and slave parameters of the host interface */
+#define ASI_STORE_OPAQUE 3200u /**< bytes of the host interface kept with the set: bus and slave parameters */
 #define ASI_STORE_TRIES 4u     /**< sectors tried for one set before the store has failed */
 #define ASI_STORE_CANDIDATES 20u /**< spoilt sets passed over at start before it is called corrupt: bounds the start */
 #define ASI_STORE_ERASE_US 3000000u  /**< us: a sector erase that takes longer has failed (0.4 s in common parts) */
@@ -43,9 +43,9 @@ typedef struct {
 /** Find and read the newest whole set. Unless state is ASI_STORE_LOADED afterwards, the content of set is anything.
  * A flash that does not answer, is empty or holds no whole set ends here too, never in a wait (NV-005). */
 void asi_store_open(asi_store_t *store, asi_permanent_set_t *set);
-/** Store this set; it must stay unchanged while store->busy. @return ASI_E_BUSY; ASI_E_STORE: there is no flash;
- * ASI_E_ARG: opaque_length or a value is out of range */
+/** Store this set; it must stay unchanged while store->busy.
+ * @return ASI_E_BUSY; ASI_E_STORE: there is no flash; ASI_E_ARG: opaque_length or a value is out of range */
 ASI_MUST_USE asi_status_t asi_store_begin(asi_store_t *store, const asi_permanent_set_t *set);
-/** One step: at most one page programmed, or one page read; to be called until !store->busy. now_us: bus time, wraps. */
+/** One step, at most one page programmed or read; to be called until !store->busy. now_us: bus time, wraps. */
 void asi_store_serve(asi_store_t *store, uint32_t now_us);
 #endif

@@ -14,3 +14,6 @@ def pytest_sessionfinish():
     import native_ctt
     for lib in native_ctt.OPENED:
         lib.fc_counters_write()
+    import native_store
+    if native_store.load.cache_info().currsize:
+        native_store.load()[1].st_counters_write()

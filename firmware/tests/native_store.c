@@ -361,3 +361,10 @@ int st_persist_opaque_set(uint32_t seed, unsigned length)
     make(&s, seed, length <= ASI_STORE_OPAQUE ? length : 0u);
     return (int)asi_persist_opaque_set(s.opaque, length);
 }
+
+#ifdef FW_GCOV
+void __gcov_dump(void);
+void st_counters_write(void) { __gcov_dump(); }
+#else
+void st_counters_write(void) {}
+#endif

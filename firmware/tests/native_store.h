@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file native_store.h  The permanent storage with its flash driver on the byte-wise flash model (tb/asi_flash.cpp), as a
- * library for cffi. One store, one flash, global. Sets are made from a seed, so that a test names a set by a number.
+ * @file native_store.h  The permanent storage with its flash driver on the byte-wise flash model (tb/asi_flash.cpp),
+ * as a library for cffi. One store, one flash, global. Sets are made from a seed: a test names a set by a number.
  * "Start" is power-up of flash and firmware. Declarations between the markers are read by test_store.py.
  */
 #ifndef FW_NATIVE_STORE_H
@@ -30,9 +30,9 @@ int st_store(uint32_t seed, unsigned opaque);   /* begin, and serve to the end: 
                                                    -2 refused, -3 without end */
 void st_set_sequence(uint32_t sequence); /* as if so many had been stored */
 uint32_t st_time_us(void);
-void st_spoil(int what);                 /* the next st_begin gets a wrong set: 1 slave 0, 2 slave 32, 3 parameter, 4 auto
-                                            clear, 5 opaque length */
-uint32_t st_field(const char *name, unsigned index);  /* of the set read at start: lps, pcd, pp, flags, length, opaque */
+void st_spoil(int what);                 /* the next st_begin gets a wrong set: 1 slave 0, 2 slave 32, 3 parameter,
+                                            4 auto clear, 5 opaque length */
+uint32_t st_field(const char *name, unsigned index);  /* of the set read: lps, pcd, pp, flags, length, opaque */
 
 typedef struct {
     uint32_t cuts;      /* tried */
@@ -42,7 +42,7 @@ typedef struct {
                            touched, 5 no end, 6 second cut: neither, 7 the third store, 8 it was not found later */
 } st_cuts_result;
 /** Power cut after every n-th SPI byte (first, first + step ..) of storing set `next`, from the present situation,
- * in this session; old_seed 0: nothing is stored. Then a start, a store with a second cut somewhere, a start, a store. */
+ * in this session; old_seed 0: nothing is stored. Then a start, a store with a second cut, a start, a store. */
 void st_cuts(uint32_t old_seed, unsigned old_opaque, uint32_t next_seed, unsigned next_opaque, uint32_t first,
              uint32_t step, uint32_t dice, st_cuts_result *result);
 
@@ -55,5 +55,6 @@ int st_persist_ended(void);                     /* -> 1: none has ended, else it
 uint32_t st_persist_word(void);
 int st_persist_opaque_is(uint32_t seed, unsigned length);
 int st_persist_opaque_set(uint32_t seed, unsigned length);  /* -> asi_status_t */
+void st_counters_write(void);  /* coverage counters to disk, now; nothing without gcov */
 /* cffi end */
 #endif

@@ -9,7 +9,7 @@ from native import BUILD, COMPILER, GCOV, PINNED, ROOT, SANITIZE, compile_native
 
 from asi import native as tb
 
-SOURCES = [ROOT / "firmware/core/asi_store.c", ROOT / "firmware/hal/asi_flash.c", ROOT / "firmware/core/asi_lists.c",
+SOURCES = [ROOT / "firmware/core/asi_store.c", ROOT / "firmware/hal/asi_flash.c",
            ROOT / "firmware/app/asi_persist.c", ROOT / "firmware/tests/native_store.c"]
 FLASH = ROOT / "tb/asi_flash.cpp"
 
@@ -22,7 +22,7 @@ def library(name, sources, flags):
     """-> shared library of sources (C) with the flash model, which is C++ without its library."""
     counting = os.environ.get("FW_COVERAGE") == "1" or os.environ.get("ASI_COVERAGE") == "1" and GCOV
     if counting:
-        flags, name = [*flags, "--coverage"], f"{name}_lines"
+        flags, name = [*flags, "--coverage", "-DFW_GCOV"], f"{name}_lines"
     if os.environ.get("FW_COVERAGE") != "1":
         flags = [*flags, *SANITIZE]
     return compile_native(BUILD / f"lib{name}.so", [*sources, *model()],

@@ -373,7 +373,8 @@ class Chip:
 
     def attach_flash(self, flash):
         """Flash (or None) on the SPI pins; it is powered up. Its content stays when the chip goes."""
-        self._lib.asi_chip_attach_flash(self._chip, flash._flash if flash else self._ffi.NULL)
+        address = int(flash._ffi.cast("uintptr_t", flash._flash)) if flash else 0  # the libraries' types differ by name
+        self._lib.asi_chip_attach_flash(self._chip, self._ffi.cast("asi_flash *", address))
         self._flash = flash  # keeps it alive
 
     def log(self):
