@@ -38,19 +38,19 @@ static inline unsigned number(unsigned t) { return ASI_CTT1_COUNT_UP ? 7u - t : 
 static inline unsigned extension(unsigned e) { return ASI_CTT1_E_REVERSED ? reversed(e) : e; }
 
 /* the next nibble: three bits with the other control bit */
-static void next(asi_ctt1_t *s, unsigned three)
+static CTT_ONCE void next(asi_ctt1_t *s, unsigned three)
 {
     s->nibble = (uint8_t)(((s->nibble & CONTROL) ^ CONTROL) | put(three));
     s->quiet = false;
 }
 
-static void ask(asi_ctt1_t *s, unsigned t)
+static CTT_ONCE void ask(asi_ctt1_t *s, unsigned t)
 {
     s->t = (uint8_t)t;
     next(s, number(t));
 }
 
-static void say(asi_ctt1_t *s, unsigned t)
+static CTT_ONCE void say(asi_ctt1_t *s, unsigned t)
 {
     s->t = (uint8_t)t;
     next(s, triple(s->frame >> (3u * t) & 7u));
@@ -63,7 +63,7 @@ static unsigned data_mask(const asi_ctt1_t *s)
 }
 
 /* outputs: take the value of this channel; it is sent whole, whatever the host writes meanwhile */
-static void latch(asi_ctt1_t *s, const asi_ctt_t *c, unsigned index)
+static CTT_ONCE void latch(asi_ctt1_t *s, const asi_ctt_t *c, unsigned index)
 {
     const unsigned value = c->ao[asi_analog_word(index) + s->channel];
     s->frame = (extension(s->channel) << 18 | (value & data_mask(s)) << 2) >> s->align | VALID_AND_NO_OVERFLOW;
@@ -156,7 +156,7 @@ static void value_out(asi_ctt_t *c, unsigned index, unsigned wanted, uint32_t no
 
 /* ---- strings */
 
-static void string_end(asi_ctt_t *c, unsigned index, asi_status_t status)
+static CTT_ONCE void string_end(asi_ctt_t *c, unsigned index, asi_status_t status)
 {
     asi_ctt1_t *s = &c->slave[index].one;
     asi_ctt_string_end(c, status, c->string.position);
@@ -219,6 +219,13 @@ static void string_out(asi_ctt_t *c, unsigned index, unsigned wanted)
     say(s, wanted);
 }
 
+/* up to 255. The core cannot divide, and a loop that subtracts becomes a division in some compilers */
+static bool multiple_of_3(unsigned n)
+{
+    n = (n & 3u) + (n >> 2 & 3u) + (n >> 4 & 3u) + (n >> 6 & 3u); /* 4 leaves 1 */
+    return (0x1249u >> n & 1u) != 0u; /* 0, 3, 6, 9, 12 */
+}
+
 bool asi_ctt1_hold(asi_ctt_t *c, unsigned index)
 {
     asi_ctt1_t *s = &c->slave[index].one;
@@ -241,12 +248,9 @@ asi_status_t asi_ctt1_string(asi_ctt_t *c, unsigned index, asi_string_kind_t kin
     if (s->mode != HELD || !s->quiet)
         return ASI_E_STATE;
     if (kind == ASI_STRING_WRITE) {
-        unsigned rest = length;
         if (length > ASI_CTT1_STRING_BYTES)
             return ASI_E_OVERFLOW;
-        while (rest >= 3u) /* no division here */
-            rest -= 3u;
-        if (length == 0u || rest != 0u)
+        if (length == 0u || !multiple_of_3(length))
             return ASI_E_ARG;
         c->string.position = 0u;
         c->string.length = (uint16_t)length;

@@ -9,6 +9,8 @@
 
 /** Inversion of payload bits between host and line (CA-005). */
 #define CTT_INVERT (ASI_INVERT_OUT ? 15u : 0u)
+/** The compiler would copy it to every place of use, and memory is short. */
+#define CTT_ONCE __attribute__((noinline))
 #define CTT_SUBSTITUTE 0x7FFFu /* of an analog value (CT-011) */
 
 void asi_ctt_status_set(asi_ctt_t *c, unsigned index, unsigned clear, unsigned set);
