@@ -44,15 +44,15 @@ void asi_ctt_status_set(asi_ctt_t *c, unsigned index, unsigned clear, unsigned s
     }
 }
 
-void asi_ctt_show(asi_ctt_t *c, unsigned index, unsigned channel, unsigned value, bool valid)
+void asi_ctt_show(asi_ctt_t *c, unsigned index, unsigned channel, unsigned value, unsigned clear, unsigned set)
 {
-    static const uint8_t bit[4] = {1, 2, 4, 8};
     uint16_t *const ai = &c->ai[asi_analog_word(index) + channel];
-    if (*ai != value) {
+    const unsigned status = (c->status[index] & ~clear) | set;
+    if (*ai != value || status != c->status[index]) {
         *ai = (uint16_t)value;
+        c->status[index] = (uint8_t)status;
         asi_list_add(&c->changed, index);
     }
-    asi_ctt_status_set(c, index, bit[channel], valid ? bit[channel] : 0u);
 }
 
 void asi_ctt_string_end(asi_ctt_t *c, asi_status_t status, unsigned length)
@@ -102,7 +102,7 @@ void asi_ctt_close(asi_ctt_t *c, unsigned index)
     case ASI_CTT_1_IN:
     case ASI_CTT_1_OUT: asi_ctt1_close(c, index); break;
     case ASI_CTT_2: asi_ctt2_close(c, index); break;
-    case ASI_CTT_3_8IO: asi_ctt_show(c, index, 0u, 0u, false); break;
+    case ASI_CTT_3_8IO: asi_ctt_show(c, index, 0u, 0u, 0xFFu, 0u); break;
     case ASI_CTT_4: asi_ctt4_close(c, index); break;
     case ASI_CTT_5: asi_ctt5_close(c, index); break;
     default: break;

@@ -73,7 +73,7 @@ static void substitute(asi_ctt_t *c, unsigned index)
 {
     const asi_ctt1_t *s = &c->slave[index].one;
     for (unsigned k = 0; !s->output && k < s->channels; k++)
-        asi_ctt_show(c, index, k, s->transparent ? 0u : CTT_SUBSTITUTE, false);
+        asi_ctt_show(c, index, k, s->transparent ? 0u : CTT_SUBSTITUTE, ASI_CTT_VALID, 0u);
 }
 
 void asi_ctt1_open(asi_ctt_t *c, unsigned index, uint16_t codes, uint32_t now_us)
@@ -131,8 +131,10 @@ static void value_in(asi_ctt_t *c, unsigned index, unsigned three)
         if (channel < s->channels) { /* else nobody knows whose value it is */
             const bool valid = (s->frame & 3u) == VALID_AND_NO_OVERFLOW;
             const unsigned value = frame >> 2 & data_mask(s);
-            asi_ctt_show(c, index, channel, valid ? value : s->transparent ? 0u : CTT_SUBSTITUTE, valid);
-            asi_ctt_status_set(c, index, 0u, ASI_CTT_TV);
+            if (valid)
+                asi_ctt_show(c, index, channel, value, 0u, ctt_valid(channel) | ASI_CTT_TV);
+            else
+                asi_ctt_show(c, index, channel, s->transparent ? 0u : CTT_SUBSTITUTE, ctt_valid(channel), ASI_CTT_TV);
         }
     }
     ask(s, t);

@@ -2,9 +2,9 @@
 /**
  * @file asi_ctt2.c  Combined transaction type 2: messages, a bit per two calls, with a clock line each way.
  * The master's clock moves on only when the nibble with its last level was answered, so the slave sees every level; a
- * call that was sent twice shows the same level twice. The receiver looks at every answer. A slave whose answer was lost
- * may go on all the same: its message is a bit short then, never complete, and ends in a gap; a cyclic request is sent
- * again.
+ * call that was sent twice shows the same level twice. The receiver looks at every answer. A slave whose answer was
+ * lost may go on all the same: its message is a bit short then, never complete, and ends in a gap; a cyclic request is
+ * sent again.
  */
 #include "asi_ctt_private.h"
 
@@ -40,7 +40,7 @@ static CTT_ONCE void invalid(asi_ctt_t *c, unsigned index)
 {
     const asi_ctt2_t *s = &c->slave[index].two;
     for (unsigned k = 0; k < words(c, index, s->in_bytes); k++)
-        asi_ctt_show(c, index, k, 0u, false);
+        asi_ctt_show(c, index, k, 0u, ASI_CTT_VALID, 0u);
 }
 
 static bool message_open(const asi_ctt_t *c, unsigned index)
@@ -101,12 +101,11 @@ static void choose(asi_ctt_t *c, unsigned index)
         const uint16_t *ao = &c->ao[asi_analog_word(index)];
         const unsigned n = words(c, index, s->out_bytes);
         s->put = false;
-        for (unsigned k = 0; k < 8u; k++)
-            s->bytes[1u + k] = 0u;
         s->bytes[0] = 1u;
-        for (unsigned k = 0; k < n; k++) {
-            s->bytes[1u + 2u * k] = (uint8_t)(ao[k] >> 8);
-            s->bytes[2u + 2u * k] = (uint8_t)ao[k];
+        for (unsigned k = 0; 2u * k < s->out_bytes; k++) {
+            const unsigned value = k < n ? ao[k] : 0u;
+            s->bytes[1u + 2u * k] = (uint8_t)(value >> 8);
+            s->bytes[2u + 2u * k] = (uint8_t)value;
         }
         if (s->out_bytes == 1u)
             s->bytes[1] = s->bytes[2];
@@ -171,11 +170,19 @@ static void whole(asi_ctt_t *c, unsigned index)
         s->out_bytes = bytes_of[s->bytes[5] >> 4 & 7u];
         break;
     case GET: {
-        const unsigned n = words(c, index, s->in_bytes);
-        for (unsigned k = 0; k < n; k++) {
-            const unsigned byte0 = s->bytes[2u * k], byte1 = s->bytes[2u * k + 1u];
-            asi_ctt_show(c, index, k, s->in_bytes == 1u ? byte0 : byte0 << 8 | byte1, true);
+        const uint8_t *bytes = s->bytes;
+        uint16_t *ai = &c->ai[asi_analog_word(index)];
+        unsigned changed = 0u, valid = 0u;
+        for (unsigned n = words(c, index, s->in_bytes); n != 0u; n--) {
+            const unsigned value = s->in_bytes == 1u ? bytes[0] : (unsigned)bytes[0] << 8 | bytes[1];
+            changed |= *ai ^ value;
+            *ai++ = (uint16_t)value;
+            bytes += 2;
+            valid += valid + 1u; /* 1, 3, 7, 15 */
         }
+        if (changed != 0u)
+            asi_list_add(&c->changed, index);
+        asi_ctt_status_set(c, index, 0u, valid);
         break;
     }
     default: { /* MESSAGE */

@@ -34,8 +34,7 @@ static unsigned group(uint32_t members, const uint16_t codes[ASI_INDICES], unsig
 static void group_gone(asi_ctt_t *c, unsigned first)
 {
     c->grouped &= ~(1u << first);
-    asi_ctt_show(c, first, 0u, 0u, false);
-    asi_ctt_status_set(c, first, 0xFFu, 0u);
+    asi_ctt_show(c, first, 0u, 0u, 0xFFu, 0u);
 }
 
 void asi_ctt5_close(asi_ctt_t *c, unsigned index)
@@ -58,10 +57,8 @@ static void show_group(asi_ctt_t *c, unsigned first, unsigned n, uint32_t fresh,
         nibble_set(out, first + k, output >> 12 & 15u);
         output <<= 4;
     }
-    if ((fresh & all) == all) {
-        asi_ctt_show(c, first, 0u, value << 4u * (4u - n), true);
-        asi_ctt_status_set(c, first, 0u, ASI_CTT_TV | ASI_CTT_OV);
-    }
+    if ((fresh & all) == all)
+        asi_ctt_show(c, first, 0u, value << 4u * (4u - n), 0u, 1u | ASI_CTT_TV | ASI_CTT_OV);
 }
 
 static void safety(asi_ctt_t *c, uint32_t called, uint32_t failed, uint32_t in[ASI_IMAGE_WORDS])

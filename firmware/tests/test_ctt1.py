@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Combined transaction type 1: values, substitutes, strings, and a line that loses, repeats or is late with any call."""
+"""Combined transaction type 1: values, substitutes, strings; a line that loses, repeats or is late with any call."""
 import pytest
 from ctt_doubles import ANSWER_LOST, LATE, OK, OUTCOMES, REPEATED, REQUEST_LOST, Ctt1, Line
 from hypothesis import given, settings
@@ -112,7 +112,7 @@ def test_substitute_values(codes, substitute, overflow, valid):
 
 
 def test_toggle_error():
-    """CT-012, CT-011: a slave that answers with the wrong control bit for 1000 ms: substitute, TV = 0; then a fresh value."""
+    """CT-012, CT-011: wrong control bit for 1000 ms: substitute, TV = 0; then a fresh value."""
     slave = Ctt1(channels=2, feed=lambda channel: (0x1111 * (channel + 1), 0, 1))
     line = Line(setup(), 8, S73D, slave).run(14 + 3)
     true_call = slave.call
@@ -188,8 +188,8 @@ def test_alternatives(name, value, output):
         line.run(7 * 4)
         assert slave.values == {0: [0, 0x1234], 1: [0xBEEF, 0xBEEF]}
     else:
-        line = Line(env, 8, 0xDF47, slave := Ctt1(channels=2, feed=lambda channel: (0x1234 << channel, 0, 1), other=other,
-                                                  strings=strings))
+        slave = Ctt1(channels=2, feed=lambda channel: (0x1234 << channel, 0, 1), other=other, strings=strings)
+        line = Line(env, 8, 0xDF47, slave)
         line.run(14)
         assert line.ai[:2] == [0x1234, 0x2468]
     assert read_string(line, 0xE, 0) == strings[0xE]
@@ -202,7 +202,8 @@ def test_alternatives(name, value, output):
 def test_shorter_values(id_, triples):
     """CT-015: S-7.1 and S-7.2 with 3 .. 7 triples a value, left-aligned, two channels, in and out; not transparent."""
     env = setup(f"ASI_CTT1_TRIPLES_7{id_}={triples}") if triples < 7 else setup()
-    line = Line(env, 3, 0x9F07 | id_ << 4, Ctt1(channels=2, triples=triples, feed=lambda channel: (0xFEDC >> channel, 0, 1)))
+    slave = Ctt1(channels=2, triples=triples, feed=lambda channel: (0xFEDC >> channel, 0, 1))
+    line = Line(env, 3, 0x9F07 | id_ << 4, slave)
     line.run(triples - 1)
     assert line.ai[0] == 0x7FFF
     line.run(1 + triples)
@@ -271,7 +272,7 @@ def test_worked_string():
 @pytest.mark.parametrize("size", [3, 6, 9, 219])
 @pytest.mark.parametrize("kind, parameter", [(0, 0xE), (1, 0xD), (2, 0xB)])
 def test_read_strings(size, kind, parameter):
-    """CT-014: ID, diagnosis and parameter string up to 219 bytes, 8 calls a sequence; values before and after are whole."""
+    """CT-014: ID, diagnosis and parameter string up to 219 bytes, 8 calls a sequence; values around it are whole."""
     slave = Ctt1(feed=feeder([0x1234]), strings={parameter: text(size)})
     line = Line(setup(), 8, S74C, slave).run(10)
     before = len(line.log)
@@ -285,7 +286,7 @@ def test_read_strings(size, kind, parameter):
 @pytest.mark.parametrize("size", [3, 6, 219])
 @pytest.mark.parametrize("output", [False, True])
 def test_write_strings(size, output):
-    """CT-014: a parameter string of whole sequences, to an input and an output slave; F and V are made by the master."""
+    """CT-014: a parameter string to an input and an output slave; F and V are made by the master."""
     slave = Ctt1(output=output, feed=feeder([0x1234]))
     line = Line(setup(), 8, S744 if output else S74C, slave)
     line.set_ao(0x7007)
@@ -379,7 +380,7 @@ def test_hold_without_string(output):
     for calls in range(8):
         for wait in range(3):
             fed = []
-            slave = Ctt1(output=output, channels=2, feed=lambda channel: (fed.append(0x1111 * len(fed)) or fed[-1], 0, 1))
+            slave = Ctt1(output, 2, feed=lambda channel: (fed.append(0x1111 * len(fed)) or fed[-1], 0, 1))
             line = Line(setup(), 8, 0x5F47 if output else 0xDF47, slave)
             line.set_ao(0x1234, 0x5678)
             line.run(7 + calls)
@@ -402,7 +403,7 @@ weighted = st.sampled_from((OK,) * 4 + OUTCOMES)
 @settings(max_examples=60, deadline=None)
 @given(st.lists(weighted, max_size=120), st.sampled_from([1, 2, 4]))
 def test_inputs_on_a_bad_line(outcomes, channels):
-    """CT-002, CT-003, CT-004: whatever is lost, repeated or late: every value shown is one that the slave gave, in order."""
+    """CT-002, CT-003, CT-004: whatever is lost, repeated or late: the values shown are the slave's, all and in order."""
     given_values = {}
     count = [0]
 
