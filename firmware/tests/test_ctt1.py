@@ -403,7 +403,7 @@ weighted = st.sampled_from((OK,) * 4 + OUTCOMES)
 @settings(max_examples=60, deadline=None)
 @given(st.lists(weighted, max_size=120), st.sampled_from([1, 2, 4]))
 def test_inputs_on_a_bad_line(outcomes, channels):
-    """CT-002, CT-003, CT-004: whatever is lost, repeated or late: the values shown are the slave's, all and in order."""
+    """CT-002, CT-003, CT-004: whatever is lost, repeated or late: the slave's values are shown, all in order."""
     given_values = {}
     count = [0]
 
