@@ -287,7 +287,7 @@ void asi_ctt1_release(asi_ctt_t *c, unsigned index, uint32_t now_us)
     } else {
         /* after another mode the slave begins anew; else it still wants what it named last */
         const unsigned wanted = s->other_mode || s->wanted > s->first ? s->first : s->wanted;
-        if (wanted == s->first || s->other_mode)
+        if (wanted == s->first)
             latch(s, c, index);
         if (s->quiet)
             say(s, wanted);

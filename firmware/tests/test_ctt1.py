@@ -374,6 +374,65 @@ def test_slave_that_never_has_enough():
     assert line.lib.fc_string_status() == STATUS["transfer"]
 
 
+def test_slave_that_wants_triples_again():
+    """CT-014, CT-003: a writing slave names the triples: any of the sequence again, the first one only for the next."""
+    slave = Ctt1()
+    line = Line(setup(), 8, S74C, slave).run(8)
+    enter(line, 7)
+    wants = iter([6, 5, 4, 3, 2, 1, 0, 3, 2, 1, 0, 7, 6, 5, 4, 3, 2, 7, 6, 5, 4, 3, 2, 1, 0, 5])
+    slave.call = lambda nibble: (nibble & 8) | next(wants)
+    line.lib.fc_string_bytes()[0:6] = bytes([0xFA, 0xC6, 0x88, 0x12, 0x34, 0x57])
+    assert line.lib.fc_string(8, 3, 6, line.now) == 0
+    slave.served_before = len(line.log) + 1
+    true_call, slave.call = slave.call, lambda nibble: nibble & 8  # the nibble that was held
+    line.call()
+    slave.call = true_call
+    line.until(lambda: not line.lib.fc_string_open(), 40)
+    assert line.lib.fc_string_status() == 0 and next(wants, None) is None
+    one, two = 0xFAC688 | 3, 0x123457 & ~2 | 1
+    order = [(one, t) for t in (7, 6, 5, 4, 3, 2, 1, 0, 3, 2, 1, 0)] + [(two, t) for t in (7, 6, 5, 4, 3, 2)]
+    order += [(two, t) for t in (7, 6, 5, 4, 3, 2, 1, 0)]
+    assert [sent & 7 for sent, _ in line.log[slave.served_before:]] == [f >> 3 * t & 7 for f, t in order]
+
+
+def test_order_of_hold_and_string():
+    """CT-014: held but not yet quiet: no string; no second hold while a string is open; the end waits for the release."""
+    slave = Ctt1(feed=feeder([0x1234]), strings={0xE: text(6)})
+    line = Line(setup(), 8, S74C, slave).run(9)
+    lib = line.lib
+    assert not lib.fc_hold(8) and lib.fc_string(8, 0, 0, line.now) == STATUS["state"]
+    enter(line, 0xE)
+    assert lib.fc_string(8, 0, 0, line.now) == 0 and not lib.fc_hold(8)
+    other = Line((line.ffi, lib), 9, S74C, Ctt1())  # another slave comes and goes meanwhile
+    lib.fc_close(9)
+    assert other.live and lib.fc_string_open()
+    line.until(lambda: not lib.fc_string_open(), 40)
+    before = line.due
+    line.run(5)
+    assert line.due == before and line.status & STRING and lib.fc_hold(8)
+    assert lib.fc_string(8, 0, 0, line.now) == 0  # and once more
+    line.until(lambda: not lib.fc_string_open(), 40)
+    leave(line)
+    line.run(9)
+    assert line.ai[0] == 0x1234
+    assert [lib.fc_inputs(8, n) for n in range(16)] == [0] * 16
+
+
+def test_output_slave_that_names_no_triple_while_held():
+    """CT-013, CT-014: a held output slave that wants triple 7 of a value gets the first one when it is released."""
+    slave = Ctt1(output=True)
+    line = Line(setup(), 8, S744, slave).run(7)
+    true_call = slave.call
+    assert not line.lib.fc_hold(8)
+    slave.call = lambda nibble: (true_call(nibble) & 8) | 7
+    line.call()
+    assert line.lib.fc_hold(8)
+    line.set_ao(0xE000)
+    line.lib.fc_release(8, line.now)
+    line.call(LATE)
+    assert line.due & 7 == 0  # E
+
+
 @pytest.mark.parametrize("output", [False, True])
 def test_hold_without_string(output):
     """CT-002, CT-014: held and released, at any triple, with or without an answer meanwhile: no torn value."""

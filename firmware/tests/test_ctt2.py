@@ -201,6 +201,32 @@ def test_broken_message_is_tried_again():
     assert line.ai[0] == 0xCAFE
 
 
+def test_broken_error_response():
+    """CT-022, CT-003: an error response of unknown length that lost a bit is no whole number of bytes: transfer error."""
+    request_ = b"\x12\x05\x01"
+    slave = Ctt2(0, answers={request_: b"\x92\x02\x11"})
+    line = Line(setup(), 7, S755, slave).run(ID_CALLS)
+    assert message(line, request_) == 0
+    line.until(lambda: len(slave.levels) == 9, 200)
+    line.call(ANSWER_LOST).until(lambda: not line.lib.fc_string_open(), 100)
+    assert line.lib.fc_string_status() == TRANSFER
+    assert exchange(line, request_) == (DEVICE, b"\x92\x02\x11")
+
+
+def test_two_slaves_one_message():
+    """CT-022: a message belongs to one slave; the cyclic service of the other one goes on, and it may even leave."""
+    env = setup()
+    one = Line(env, 7, S755, Ctt2(0x02, inputs=lambda: b"\x11\x22"))
+    two = Line(env, 9, S755, other := Ctt2(0x02, inputs=lambda: b"\x33\x44"))
+    assert message(one, b"\x10\x00\x05") == 0
+    for _ in range(ID_CALLS + 60):
+        two.call()
+    assert two.ai[0] == 0x3344 and b"\x10\x00\x05" in other.requests and env[1].fc_string_open()
+    env[1].fc_close(9)
+    one.until(lambda: not env[1].fc_string_open(), 500)
+    assert env[1].fc_string_status() == 0 and env[1].fc_string_length() == 6
+
+
 def test_busy_slave():
     """CT-021: a slave that is busy when its ID object is read is asked again, and its lines are not swapped."""
     slave = Ctt2(0x02, inputs=lambda: b"\xCA\xFE")
