@@ -57,6 +57,8 @@ unsigned asi_ctt3_call_8io(asi_ctt_t *c, unsigned index, const asi_ctt_call_t *c
             if (selector == 0u) {
                 s->snapshot = (uint8_t)c->ao[asi_analog_word(index)];
                 s->run = 0u;
+            } else if ((call->sent & 7u) != s->nibble) {
+                s->snapshot = 0u; /* it took the very first nibble, sent again, as pair 0: all bits 0 */
             }
             s->run = selector == s->run ? (uint8_t)(selector + 1u) : (uint8_t)BROKEN;
             s->inputs = (uint8_t)((s->inputs & keep[selector]) | (call->answer & 3u) << (2u * selector));

@@ -159,6 +159,15 @@ def test_eight_bits_out_of_order():
     assert line.ai[0] == 0b10101010 and line.status & 1
 
 
+def test_eight_bits_first_nibble_twice():
+    """CT-031, CT-003: the very first nibble confirms selector 0; sent again by a late firmware it must not tear a byte."""
+    slave = Ctt3x8()
+    line = Line(setup(), 5, S7AA, slave)
+    line.set_ao(0xFF)
+    line.call().call(LATE).run(8)
+    assert slave.taken == [0, 0xFF]
+
+
 @pytest.mark.parametrize("defines, other", [(("ASI_CTT3_AA_OFFSET=1",), {"offset": 1}), (("ASI_CTT3_AA_INVERTED=0",),
                                                                                       {"inverted": 0})])
 def test_eight_bits_alternatives(defines, other):
