@@ -7,30 +7,24 @@ _Static_assert(ASI_CTT2_MESSAGE_BYTES >= ASI_CTT1_STRING_BYTES, "strings and mes
 
 asi_ctt_kind_t asi_ctt_kind(uint16_t codes)
 {
-    const unsigned io = codes & 15u, id = (unsigned)codes >> 4 & 15u, id2 = (unsigned)codes >> 12;
+    static const struct { uint8_t profile, id2, kind; } kinds[] = { /* profile: IO, ID */
+        {0x75, 0x5, ASI_CTT_2},     {0x7A, 0x5, ASI_CTT_2},     {0xBA, 0x5, ASI_CTT_2}, {0x7A, 0x7, ASI_CTT_3_4IO},
+        {0x7A, 0xA, ASI_CTT_3_8IO}, {0x7A, 0x8, ASI_CTT_4},     {0x7A, 0x9, ASI_CTT_4},
+        /* a member says its place in the group: first = 8 + n, others 4 + those still to come */
+        {0x60, 0xA, ASI_CTT_5},     {0x60, 0xB, ASI_CTT_5},     {0x60, 0xC, ASI_CTT_5},
+        {0x60, 0x7, ASI_CTT_5},     {0x60, 0x6, ASI_CTT_5},     {0x60, 0x5, ASI_CTT_5},
+        {0x74, 0x0, ASI_CTT_NONE}, /* 4I/4O mode */
+    };
+    const unsigned id = (unsigned)codes >> 4 & 15u, id2 = (unsigned)codes >> 12;
+    const unsigned profile = (codes & 15u) << 4 | id;
     if (id == 0xBu)
         return ASI_CTT_SAFETY;
-    if (id == 0xAu) {
-        if (id2 == 5u)
-            return io == 7u || io == 0xBu ? ASI_CTT_2 : ASI_CTT_NONE;
-        if (io != 7u)
-            return ASI_CTT_NONE;
-        switch (id2) {
-        case 7u: return ASI_CTT_3_4IO;
-        case 0xAu: return ASI_CTT_3_8IO;
-        case 8u:
-        case 9u: return ASI_CTT_4;
-        default: return ASI_CTT_NONE;
-        }
+    for (unsigned k = 0u; k < sizeof kinds / sizeof kinds[0]; k++) {
+        if (kinds[k].profile == profile && kinds[k].id2 == id2)
+            return (asi_ctt_kind_t)kinds[k].kind;
     }
-    if (io == 6u && id == 0u) /* a member says its place in the group: first = 8 + n, others 4 + those still to come */
-        return (id2 >= 5u && id2 <= 7u) || (id2 >= 0xAu && id2 <= 0xCu) ? ASI_CTT_5 : ASI_CTT_NONE;
-    if (io != 7u || id == 0u || id > 5u)
+    if (profile < 0x71u || profile > 0x74u)
         return ASI_CTT_NONE;
-    if (id == 5u)
-        return id2 == 5u ? ASI_CTT_2 : ASI_CTT_NONE;
-    if (id == 4u && id2 == 0u)
-        return ASI_CTT_NONE; /* 4I/4O mode */
     return (id2 & 8u) != 0u ? ASI_CTT_1_IN : ASI_CTT_1_OUT;
 }
 
@@ -50,15 +44,15 @@ void asi_ctt_status_set(asi_ctt_t *c, unsigned index, unsigned clear, unsigned s
     }
 }
 
-void asi_ctt_show(asi_ctt_t *c, unsigned index, unsigned channel, unsigned value, bool valid)
+void asi_ctt_show(asi_ctt_t *c, unsigned index, unsigned channel, unsigned value, unsigned clear, unsigned set)
 {
-    static const uint8_t bit[4] = {1, 2, 4, 8};
     uint16_t *const ai = &c->ai[asi_analog_word(index) + channel];
-    if (*ai != value) {
+    const unsigned status = (c->status[index] & ~clear) | set;
+    if (*ai != value || status != c->status[index]) {
         *ai = (uint16_t)value;
+        c->status[index] = (uint8_t)status;
         asi_list_add(&c->changed, index);
     }
-    asi_ctt_status_set(c, index, bit[channel], valid ? bit[channel] : 0u);
 }
 
 void asi_ctt_string_end(asi_ctt_t *c, asi_status_t status, unsigned length)
@@ -90,8 +84,8 @@ bool asi_ctt_open(asi_ctt_t *c, unsigned index, uint16_t codes, uint32_t now_us)
         if (!ASI_CTT4_ENABLE)
             return false; /* plain bits, transfer invalid */
         break;
-    case ASI_CTT_5: asi_list_add(&c->groups, index); return false;
-    case ASI_CTT_SAFETY: asi_list_add(&c->safety, index); return false;
+    case ASI_CTT_5: c->groups |= 1u << index; return false; /* index < 32 */
+    case ASI_CTT_SAFETY: c->safety |= 1u << index; return false;
     default: return false;
     }
     asi_list_add(&c->live, index);
@@ -108,17 +102,20 @@ void asi_ctt_close(asi_ctt_t *c, unsigned index)
     case ASI_CTT_1_IN:
     case ASI_CTT_1_OUT: asi_ctt1_close(c, index); break;
     case ASI_CTT_2: asi_ctt2_close(c, index); break;
-    case ASI_CTT_3_8IO: asi_ctt_show(c, index, 0u, 0u, false); break;
+    case ASI_CTT_3_8IO: asi_ctt_show(c, index, 0u, 0u, 0xFFu, 0u); break;
     case ASI_CTT_4: asi_ctt4_close(c, index); break;
     case ASI_CTT_5: asi_ctt5_close(c, index); break;
     default: break;
     }
     asi_ctt_status_set(c, index, 0xFFu, 0u);
     asi_list_remove(&c->live, index);
-    asi_list_remove(&c->groups, index);
-    asi_list_remove(&c->safety, index);
-    asi_list_remove(&c->safe_in[0], index);
-    asi_list_remove(&c->safe_in[1], index);
+    if (index < 32u) {
+        const uint32_t others = ~(1u << index);
+        c->groups &= others;
+        c->safety &= others;
+        c->safe_in[0].w[0] &= others;
+        c->safe_in[1].w[0] &= others;
+    }
     c->kind[index] = ASI_CTT_NONE;
 }
 

@@ -137,8 +137,8 @@ typedef struct {
     /* private */
     uint8_t kind[ASI_INDICES];       /**< asi_ctt_kind_t; NONE while not open */
     asi_list_t live;
-    asi_list_t groups, safety;       /**< open members of CTT5 groups; open safety slaves */
-    asi_list_t grouped;              /**< first members of groups whose value is shown */
+    uint32_t groups, safety;         /**< indices 1 .. 31: open members of CTT5 groups; open safety slaves */
+    uint32_t grouped;                /**< first members of groups whose value is shown */
     asi_list_t swapped;              /**< CTT2 slaves with data and clock swapped; kept over close and open */
     asi_ctt_slave_t slave[ASI_INDICES];
 } asi_ctt_t;

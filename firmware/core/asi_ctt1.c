@@ -38,19 +38,19 @@ static inline unsigned number(unsigned t) { return ASI_CTT1_COUNT_UP ? 7u - t : 
 static inline unsigned extension(unsigned e) { return ASI_CTT1_E_REVERSED ? reversed(e) : e; }
 
 /* the next nibble: three bits with the other control bit */
-static void next(asi_ctt1_t *s, unsigned three)
+static CTT_ONCE void next(asi_ctt1_t *s, unsigned three)
 {
     s->nibble = (uint8_t)(((s->nibble & CONTROL) ^ CONTROL) | put(three));
     s->quiet = false;
 }
 
-static void ask(asi_ctt1_t *s, unsigned t)
+static CTT_ONCE void ask(asi_ctt1_t *s, unsigned t)
 {
     s->t = (uint8_t)t;
     next(s, number(t));
 }
 
-static void say(asi_ctt1_t *s, unsigned t)
+static CTT_ONCE void say(asi_ctt1_t *s, unsigned t)
 {
     s->t = (uint8_t)t;
     next(s, triple(s->frame >> (3u * t) & 7u));
@@ -63,7 +63,7 @@ static unsigned data_mask(const asi_ctt1_t *s)
 }
 
 /* outputs: take the value of this channel; it is sent whole, whatever the host writes meanwhile */
-static void latch(asi_ctt1_t *s, const asi_ctt_t *c, unsigned index)
+static CTT_ONCE void latch(asi_ctt1_t *s, const asi_ctt_t *c, unsigned index)
 {
     const unsigned value = c->ao[asi_analog_word(index) + s->channel];
     s->frame = (extension(s->channel) << 18 | (value & data_mask(s)) << 2) >> s->align | VALID_AND_NO_OVERFLOW;
@@ -73,7 +73,7 @@ static void substitute(asi_ctt_t *c, unsigned index)
 {
     const asi_ctt1_t *s = &c->slave[index].one;
     for (unsigned k = 0; !s->output && k < s->channels; k++)
-        asi_ctt_show(c, index, k, s->transparent ? 0u : CTT_SUBSTITUTE, false);
+        asi_ctt_show(c, index, k, s->transparent ? 0u : CTT_SUBSTITUTE, ASI_CTT_VALID, 0u);
 }
 
 void asi_ctt1_open(asi_ctt_t *c, unsigned index, uint16_t codes, uint32_t now_us)
@@ -131,8 +131,10 @@ static void value_in(asi_ctt_t *c, unsigned index, unsigned three)
         if (channel < s->channels) { /* else nobody knows whose value it is */
             const bool valid = (s->frame & 3u) == VALID_AND_NO_OVERFLOW;
             const unsigned value = frame >> 2 & data_mask(s);
-            asi_ctt_show(c, index, channel, valid ? value : s->transparent ? 0u : CTT_SUBSTITUTE, valid);
-            asi_ctt_status_set(c, index, 0u, ASI_CTT_TV);
+            if (valid)
+                asi_ctt_show(c, index, channel, value, 0u, ctt_valid(channel) | ASI_CTT_TV);
+            else
+                asi_ctt_show(c, index, channel, s->transparent ? 0u : CTT_SUBSTITUTE, ctt_valid(channel), ASI_CTT_TV);
         }
     }
     ask(s, t);
@@ -156,7 +158,7 @@ static void value_out(asi_ctt_t *c, unsigned index, unsigned wanted, uint32_t no
 
 /* ---- strings */
 
-static void string_end(asi_ctt_t *c, unsigned index, asi_status_t status)
+static CTT_ONCE void string_end(asi_ctt_t *c, unsigned index, asi_status_t status)
 {
     asi_ctt1_t *s = &c->slave[index].one;
     asi_ctt_string_end(c, status, c->string.position);
@@ -219,6 +221,13 @@ static void string_out(asi_ctt_t *c, unsigned index, unsigned wanted)
     say(s, wanted);
 }
 
+/* up to 255. The core cannot divide, and a loop that subtracts becomes a division in some compilers */
+static bool multiple_of_3(unsigned n)
+{
+    n = (n & 3u) + (n >> 2 & 3u) + (n >> 4 & 3u) + (n >> 6 & 3u); /* 4 leaves 1 */
+    return (0x1249u >> n & 1u) != 0u; /* 0, 3, 6, 9, 12 */
+}
+
 bool asi_ctt1_hold(asi_ctt_t *c, unsigned index)
 {
     asi_ctt1_t *s = &c->slave[index].one;
@@ -233,13 +242,6 @@ bool asi_ctt1_hold(asi_ctt_t *c, unsigned index)
     return s->mode == HELD && s->quiet;
 }
 
-/** Digits of base 4 add up to a multiple of 3, for n up to 255: the core cannot divide. */
-static bool is_multiple_of_3(unsigned n)
-{
-    const unsigned sum = (n & 3u) + (n >> 2 & 3u) + (n >> 4 & 3u) + (n >> 6 & 3u);
-    return (0x1249u >> sum & 1u) != 0u;
-}
-
 asi_status_t asi_ctt1_string(asi_ctt_t *c, unsigned index, asi_string_kind_t kind, unsigned length, uint32_t now_us)
 {
     asi_ctt1_t *s = &c->slave[index].one;
@@ -250,7 +252,7 @@ asi_status_t asi_ctt1_string(asi_ctt_t *c, unsigned index, asi_string_kind_t kin
     if (kind == ASI_STRING_WRITE) {
         if (length > ASI_CTT1_STRING_BYTES)
             return ASI_E_OVERFLOW;
-        if (length == 0u || !is_multiple_of_3(length))
+        if (length == 0u || !multiple_of_3(length))
             return ASI_E_ARG;
         c->string.position = 0u;
         c->string.length = (uint16_t)length;
@@ -285,7 +287,7 @@ void asi_ctt1_release(asi_ctt_t *c, unsigned index, uint32_t now_us)
     } else {
         /* after another mode the slave begins anew; else it still wants what it named last */
         const unsigned wanted = s->other_mode || s->wanted > s->first ? s->first : s->wanted;
-        if (wanted == s->first || s->other_mode)
+        if (wanted == s->first)
             latch(s, c, index);
         if (s->quiet)
             say(s, wanted);

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
  * @file asi_ctt2.c  Combined transaction type 2: messages, a bit per two calls, with a clock line each way.
- * The master's clock moves on only when the nibble with its last level was answered, so the slave sees every level; a call
- * that was sent twice shows the same level twice. The receiver looks at every answer. A slave whose answer was lost may go
- * on all the same: its message is a bit short then, never complete, and ends in a gap; a cyclic request is sent again.
+ * The master's clock moves on only when the nibble with its last level was answered, so the slave sees every level; a
+ * call that was sent twice shows the same level twice. The receiver looks at every answer. A slave whose answer was
+ * lost may go on all the same: its message is a bit short then, never complete, and ends in a gap; a cyclic request is
+ * sent again.
  */
 #include "asi_ctt_private.h"
 
@@ -22,24 +23,24 @@ enum { ID_BYTES = 5, RESPONSE_OK = 0x40, RESPONSE_ERROR = 0x80 };
 enum { REQUEST_READ = 0x10, REQUEST_WRITE, REQUEST_DEVICE_READ, REQUEST_DEVICE_WRITE, REQUEST_EXCHANGE = 0x1D };
 #define ID_CODE 0x10u /* the ID object is index 0 of a read */
 
-static uint8_t *buffer(asi_ctt_t *c, unsigned index)
+static CTT_ONCE uint8_t *buffer(asi_ctt_t *c, unsigned index)
 {
     asi_ctt2_t *s = &c->slave[index].two;
     return s->service == MESSAGE ? c->string.bytes : s->bytes;
 }
 
 /* of the value image: two for an A or B slave; what the slave moves beyond is not shown, and 0 */
-static unsigned words(const asi_ctt_t *c, unsigned index, unsigned bytes)
+static CTT_ONCE unsigned words(const asi_ctt_t *c, unsigned index, unsigned bytes)
 {
     const unsigned n = (bytes + 1u) >> 1;
     return c->slave[index].two.two_words && n > 2u ? 2u : n;
 }
 
-static void invalid(asi_ctt_t *c, unsigned index)
+static CTT_ONCE void invalid(asi_ctt_t *c, unsigned index)
 {
     const asi_ctt2_t *s = &c->slave[index].two;
     for (unsigned k = 0; k < words(c, index, s->in_bytes); k++)
-        asi_ctt_show(c, index, k, 0u, false);
+        asi_ctt_show(c, index, k, 0u, ASI_CTT_VALID, 0u);
 }
 
 static bool message_open(const asi_ctt_t *c, unsigned index)
@@ -55,7 +56,7 @@ static void level(asi_ctt2_t *s, unsigned clock, unsigned data)
 /* ---- sending */
 
 /* first half of the next bit: the other clock level, data already there */
-static void send_bit(asi_ctt2_t *s)
+static CTT_ONCE void send_bit(asi_ctt2_t *s)
 {
     const unsigned data = ASI_CTT2_MSB_FIRST ? s->tx & 0x80u : s->tx & 1u;
     s->tx = (uint8_t)(ASI_CTT2_MSB_FIRST ? s->tx << 1 : s->tx >> 1);
@@ -64,7 +65,7 @@ static void send_bit(asi_ctt2_t *s)
     level(s, !TAKEN_AT, data);
 }
 
-static void send(asi_ctt_t *c, unsigned index, unsigned service, unsigned length)
+static CTT_ONCE void send(asi_ctt_t *c, unsigned index, unsigned service, unsigned length)
 {
     asi_ctt2_t *s = &c->slave[index].two;
     s->service = (uint8_t)service;
@@ -100,12 +101,11 @@ static void choose(asi_ctt_t *c, unsigned index)
         const uint16_t *ao = &c->ao[asi_analog_word(index)];
         const unsigned n = words(c, index, s->out_bytes);
         s->put = false;
-        for (unsigned k = 0; k < 8u; k++)
-            s->bytes[1u + k] = 0u;
         s->bytes[0] = 1u;
-        for (unsigned k = 0; k < n; k++) {
-            s->bytes[1u + 2u * k] = (uint8_t)(ao[k] >> 8);
-            s->bytes[2u + 2u * k] = (uint8_t)ao[k];
+        for (unsigned k = 0; 2u * k < s->out_bytes; k++) {
+            const unsigned value = k < n ? ao[k] : 0u;
+            s->bytes[1u + 2u * k] = (uint8_t)(value >> 8);
+            s->bytes[2u + 2u * k] = (uint8_t)value;
         }
         if (s->out_bytes == 1u)
             s->bytes[1] = s->bytes[2];
@@ -170,11 +170,19 @@ static void whole(asi_ctt_t *c, unsigned index)
         s->out_bytes = bytes_of[s->bytes[5] >> 4 & 7u];
         break;
     case GET: {
-        const unsigned n = words(c, index, s->in_bytes);
-        for (unsigned k = 0; k < n; k++) {
-            const unsigned byte0 = s->bytes[2u * k], byte1 = s->bytes[2u * k + 1u];
-            asi_ctt_show(c, index, k, s->in_bytes == 1u ? byte0 : byte0 << 8 | byte1, true);
+        const uint8_t *bytes = s->bytes;
+        uint16_t *ai = &c->ai[asi_analog_word(index)];
+        unsigned changed = 0u, valid = 0u;
+        for (unsigned n = words(c, index, s->in_bytes); n != 0u; n--) {
+            const unsigned value = s->in_bytes == 1u ? bytes[0] : (unsigned)bytes[0] << 8 | bytes[1];
+            changed |= *ai ^ value;
+            *ai++ = (uint16_t)value;
+            bytes += 2;
+            valid += valid + 1u; /* 1, 3, 7, 15 */
         }
+        if (changed != 0u)
+            asi_list_add(&c->changed, index);
+        asi_ctt_status_set(c, index, 0u, valid);
         break;
     }
     default: { /* MESSAGE */

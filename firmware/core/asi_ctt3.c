@@ -57,13 +57,14 @@ unsigned asi_ctt3_call_8io(asi_ctt_t *c, unsigned index, const asi_ctt_call_t *c
             if (selector == 0u) {
                 s->snapshot = (uint8_t)c->ao[asi_analog_word(index)];
                 s->run = 0u;
+            } else if ((call->sent & 7u) != s->nibble) {
+                s->snapshot = 0u; /* it took the very first nibble, sent again, as pair 0: all bits 0 */
             }
             s->run = selector == s->run ? (uint8_t)(selector + 1u) : (uint8_t)BROKEN;
             s->inputs = (uint8_t)((s->inputs & keep[selector]) | (call->answer & 3u) << (2u * selector));
             if (s->run == 4u) { /* 0, 1, 2, 3 */
                 s->last_us = call->now_us;
-                asi_ctt_show(c, index, 0u, s->inputs, true);
-                asi_ctt_status_set(c, index, 0u, ASI_CTT_OV | ASI_CTT_TV);
+                asi_ctt_show(c, index, 0u, s->inputs, 0u, 1u | ASI_CTT_OV | ASI_CTT_TV);
             }
             const unsigned pair = (selector + ASI_CTT3_AA_OFFSET) & 3u;
             const unsigned clock = (selector ^ (ASI_CTT3_AA_INVERTED ? 1u : 0u)) & 1u;
@@ -71,8 +72,7 @@ unsigned asi_ctt3_call_8io(asi_ctt_t *c, unsigned index, const asi_ctt_call_t *c
         }
     }
     if ((c->status[index] & ASI_CTT_TV) != 0u && ctt_elapsed(call->now_us, s->last_us, ASI_CTT3_TIMEOUT_MS)) {
-        asi_ctt_show(c, index, 0u, 0u, false);
-        asi_ctt_status_set(c, index, ASI_CTT_OV | ASI_CTT_TV, 0u);
+        asi_ctt_show(c, index, 0u, 0u, 0xFFu, 0u);
     }
     return s->nibble;
 }

@@ -17,10 +17,9 @@ static void compose(asi_ctt4_t *s, unsigned outputs)
 
 static void substitute(asi_ctt_t *c, unsigned index)
 {
-    asi_ctt_show(c, index, 0u, CTT_SUBSTITUTE, false);
+    asi_ctt_show(c, index, 0u, CTT_SUBSTITUTE, 0xFFu, 0u);
     if (c->slave[index].four.two)
-        asi_ctt_show(c, index, 1u, CTT_SUBSTITUTE, false);
-    asi_ctt_status_set(c, index, ASI_CTT_TV | ASI_CTT_OV, 0u);
+        asi_ctt_show(c, index, 1u, CTT_SUBSTITUTE, 0xFFu, 0u);
 }
 
 void asi_ctt4_open(asi_ctt_t *c, unsigned index, uint16_t codes, uint32_t now_us)
@@ -54,8 +53,8 @@ unsigned asi_ctt4_call(asi_ctt_t *c, unsigned index, const asi_ctt_call_t *call)
         } else {
             s->number = FIRST;
             s->last_us = call->now_us;
-            asi_ctt_show(c, index, s->channel, s->value, true);
-            asi_ctt_status_set(c, index, 0u, ASI_CTT_TV | (s->two ? 0u : ASI_CTT_OV));
+            asi_ctt_show(c, index, s->channel, s->value, 0u,
+                         ctt_valid(s->channel) | ASI_CTT_TV | (s->two ? 0u : ASI_CTT_OV));
             if (s->two)
                 s->channel ^= 1u;
         }

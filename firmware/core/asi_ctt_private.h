@@ -9,11 +9,18 @@
 
 /** Inversion of payload bits between host and line (CA-005). */
 #define CTT_INVERT (ASI_INVERT_OUT ? 15u : 0u)
+/** The compiler would copy it to every place of use, and memory is short. */
+#define CTT_ONCE __attribute__((noinline))
 #define CTT_SUBSTITUTE 0x7FFFu /* of an analog value (CT-011) */
 
 void asi_ctt_status_set(asi_ctt_t *c, unsigned index, unsigned clear, unsigned set);
-/** Show a value of a channel (0..3) as the slave's (valid), or as a substitute. */
-void asi_ctt_show(asi_ctt_t *c, unsigned index, unsigned channel, unsigned value, bool valid);
+/** Show a value of a channel (0..3), with changes of the status: the slave's sets the channel's bit. */
+void asi_ctt_show(asi_ctt_t *c, unsigned index, unsigned channel, unsigned value, unsigned clear, unsigned set);
+/** Status bit of a channel. */
+static inline unsigned ctt_valid(unsigned channel)
+{
+    return channel < 2u ? channel + 1u : channel * 4u - 4u; /* 1, 2, 4, 8: cheaper than a shift */
+}
 /** The open string is over. */
 void asi_ctt_string_end(asi_ctt_t *c, asi_status_t status, unsigned length);
 

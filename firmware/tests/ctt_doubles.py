@@ -263,7 +263,7 @@ class Ctt3x4:
 
 
 class Ctt3x8:
-    """S-7.A.A under the echo rule: takes the pair for the selector sent last when I2 confirms it, else says it again."""
+    """S-7.A.A under the echo rule: takes the pair for the selector sent last if I2 confirms it, else says it again."""
     extended = True
 
     def __init__(self, feed=None, other=None):

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
- * @file native_ctt.h  The engines of the combined transactions as a native library for tests: flat, global, single-threaded.
- * Declarations between the markers are read by firmware/tests/native_ctt.py.
+ * @file native_ctt.h  The engines of the combined transactions as a native library for tests: flat, global,
+ * single-threaded. Declarations between the markers are read by firmware/tests/native_ctt.py.
  */
 #ifndef FW_NATIVE_CTT_H
 #define FW_NATIVE_CTT_H

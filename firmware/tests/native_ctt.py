@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Build the engines of the combined transactions natively, as they are or with other constants, and open them through cffi."""
+"""Build the engines of the combined transactions natively, as they are or with other constants, and open them."""
 import functools
 import os
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Combined transaction type 1: values, substitutes, strings, and a line that loses, repeats or is late with any call."""
+"""Combined transaction type 1: values, substitutes, strings; a line that loses, repeats or is late with any call."""
 import pytest
 from ctt_doubles import ANSWER_LOST, LATE, OK, OUTCOMES, REPEATED, REQUEST_LOST, Ctt1, Line
 from hypothesis import given, settings
@@ -112,7 +112,7 @@ def test_substitute_values(codes, substitute, overflow, valid):
 
 
 def test_toggle_error():
-    """CT-012, CT-011: a slave that answers with the wrong control bit for 1000 ms: substitute, TV = 0; then a fresh value."""
+    """CT-012, CT-011: wrong control bit for 1000 ms: substitute, TV = 0; then a fresh value."""
     slave = Ctt1(channels=2, feed=lambda channel: (0x1111 * (channel + 1), 0, 1))
     line = Line(setup(), 8, S73D, slave).run(14 + 3)
     true_call = slave.call
@@ -188,8 +188,8 @@ def test_alternatives(name, value, output):
         line.run(7 * 4)
         assert slave.values == {0: [0, 0x1234], 1: [0xBEEF, 0xBEEF]}
     else:
-        line = Line(env, 8, 0xDF47, slave := Ctt1(channels=2, feed=lambda channel: (0x1234 << channel, 0, 1), other=other,
-                                                  strings=strings))
+        slave = Ctt1(channels=2, feed=lambda channel: (0x1234 << channel, 0, 1), other=other, strings=strings)
+        line = Line(env, 8, 0xDF47, slave)
         line.run(14)
         assert line.ai[:2] == [0x1234, 0x2468]
     assert read_string(line, 0xE, 0) == strings[0xE]
@@ -202,7 +202,8 @@ def test_alternatives(name, value, output):
 def test_shorter_values(id_, triples):
     """CT-015: S-7.1 and S-7.2 with 3 .. 7 triples a value, left-aligned, two channels, in and out; not transparent."""
     env = setup(f"ASI_CTT1_TRIPLES_7{id_}={triples}") if triples < 7 else setup()
-    line = Line(env, 3, 0x9F07 | id_ << 4, Ctt1(channels=2, triples=triples, feed=lambda channel: (0xFEDC >> channel, 0, 1)))
+    slave = Ctt1(channels=2, triples=triples, feed=lambda channel: (0xFEDC >> channel, 0, 1))
+    line = Line(env, 3, 0x9F07 | id_ << 4, slave)
     line.run(triples - 1)
     assert line.ai[0] == 0x7FFF
     line.run(1 + triples)
@@ -271,7 +272,7 @@ def test_worked_string():
 @pytest.mark.parametrize("size", [3, 6, 9, 219])
 @pytest.mark.parametrize("kind, parameter", [(0, 0xE), (1, 0xD), (2, 0xB)])
 def test_read_strings(size, kind, parameter):
-    """CT-014: ID, diagnosis and parameter string up to 219 bytes, 8 calls a sequence; values before and after are whole."""
+    """CT-014: ID, diagnosis and parameter string up to 219 bytes, 8 calls a sequence; values around it are whole."""
     slave = Ctt1(feed=feeder([0x1234]), strings={parameter: text(size)})
     line = Line(setup(), 8, S74C, slave).run(10)
     before = len(line.log)
@@ -285,7 +286,7 @@ def test_read_strings(size, kind, parameter):
 @pytest.mark.parametrize("size", [3, 6, 219])
 @pytest.mark.parametrize("output", [False, True])
 def test_write_strings(size, output):
-    """CT-014: a parameter string of whole sequences, to an input and an output slave; F and V are made by the master."""
+    """CT-014: a parameter string to an input and an output slave; F and V are made by the master."""
     slave = Ctt1(output=output, feed=feeder([0x1234]))
     line = Line(setup(), 8, S744 if output else S74C, slave)
     line.set_ao(0x7007)
@@ -373,13 +374,72 @@ def test_slave_that_never_has_enough():
     assert line.lib.fc_string_status() == STATUS["transfer"]
 
 
+def test_slave_that_wants_triples_again():
+    """CT-014, CT-003: a writing slave names the triples: any of the sequence again, the first one only for the next."""
+    slave = Ctt1()
+    line = Line(setup(), 8, S74C, slave).run(8)
+    enter(line, 7)
+    wants = iter([6, 5, 4, 3, 2, 1, 0, 3, 2, 1, 0, 7, 6, 5, 4, 3, 2, 7, 6, 5, 4, 3, 2, 1, 0, 5])
+    slave.call = lambda nibble: (nibble & 8) | next(wants)
+    line.lib.fc_string_bytes()[0:6] = bytes([0xFA, 0xC6, 0x88, 0x12, 0x34, 0x57])
+    assert line.lib.fc_string(8, 3, 6, line.now) == 0
+    slave.served_before = len(line.log) + 1
+    true_call, slave.call = slave.call, lambda nibble: nibble & 8  # the nibble that was held
+    line.call()
+    slave.call = true_call
+    line.until(lambda: not line.lib.fc_string_open(), 40)
+    assert line.lib.fc_string_status() == 0 and next(wants, None) is None
+    one, two = 0xFAC688 | 3, 0x123457 & ~2 | 1
+    order = [(one, t) for t in (7, 6, 5, 4, 3, 2, 1, 0, 3, 2, 1, 0)] + [(two, t) for t in (7, 6, 5, 4, 3, 2)]
+    order += [(two, t) for t in (7, 6, 5, 4, 3, 2, 1, 0)]
+    assert [sent & 7 for sent, _ in line.log[slave.served_before:]] == [f >> 3 * t & 7 for f, t in order]
+
+
+def test_order_of_hold_and_string():
+    """CT-014: held but not yet quiet: no string; no second hold while a string is open; the end waits for the release."""
+    slave = Ctt1(feed=feeder([0x1234]), strings={0xE: text(6)})
+    line = Line(setup(), 8, S74C, slave).run(9)
+    lib = line.lib
+    assert not lib.fc_hold(8) and lib.fc_string(8, 0, 0, line.now) == STATUS["state"]
+    enter(line, 0xE)
+    assert lib.fc_string(8, 0, 0, line.now) == 0 and not lib.fc_hold(8)
+    other = Line((line.ffi, lib), 9, S74C, Ctt1())  # another slave comes and goes meanwhile
+    lib.fc_close(9)
+    assert other.live and lib.fc_string_open()
+    line.until(lambda: not lib.fc_string_open(), 40)
+    before = line.due
+    line.run(5)
+    assert line.due == before and line.status & STRING and lib.fc_hold(8)
+    assert lib.fc_string(8, 0, 0, line.now) == 0  # and once more
+    line.until(lambda: not lib.fc_string_open(), 40)
+    leave(line)
+    line.run(9)
+    assert line.ai[0] == 0x1234
+    assert [lib.fc_inputs(8, n) for n in range(16)] == [0] * 16
+
+
+def test_output_slave_that_names_no_triple_while_held():
+    """CT-013, CT-014: a held output slave that wants triple 7 of a value gets the first one when it is released."""
+    slave = Ctt1(output=True)
+    line = Line(setup(), 8, S744, slave).run(7)
+    true_call = slave.call
+    assert not line.lib.fc_hold(8)
+    slave.call = lambda nibble: (true_call(nibble) & 8) | 7
+    line.call()
+    assert line.lib.fc_hold(8)
+    line.set_ao(0xE000)
+    line.lib.fc_release(8, line.now)
+    line.call(LATE)
+    assert line.due & 7 == 0  # E
+
+
 @pytest.mark.parametrize("output", [False, True])
 def test_hold_without_string(output):
     """CT-002, CT-014: held and released, at any triple, with or without an answer meanwhile: no torn value."""
     for calls in range(8):
         for wait in range(3):
             fed = []
-            slave = Ctt1(output=output, channels=2, feed=lambda channel: (fed.append(0x1111 * len(fed)) or fed[-1], 0, 1))
+            slave = Ctt1(output, 2, feed=lambda channel: (fed.append(0x1111 * len(fed)) or fed[-1], 0, 1))
             line = Line(setup(), 8, 0x5F47 if output else 0xDF47, slave)
             line.set_ao(0x1234, 0x5678)
             line.run(7 + calls)
@@ -402,7 +462,7 @@ weighted = st.sampled_from((OK,) * 4 + OUTCOMES)
 @settings(max_examples=60, deadline=None)
 @given(st.lists(weighted, max_size=120), st.sampled_from([1, 2, 4]))
 def test_inputs_on_a_bad_line(outcomes, channels):
-    """CT-002, CT-003, CT-004: whatever is lost, repeated or late: every value shown is one that the slave gave, in order."""
+    """CT-002, CT-003, CT-004: whatever is lost, repeated or late: the slave's values are shown, all in order."""
     given_values = {}
     count = [0]
 

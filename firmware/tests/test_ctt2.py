@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Combined transaction type 2: bits, messages, cyclic service, and a line that loses, repeats or is late with any call."""
+"""Combined transaction type 2: bits, messages, cyclic service; a line that loses, repeats or is late with any call."""
 import pytest
 from asi import ctt_table as table
 from ctt_doubles import ANSWER_LOST, LATE, OK, REPEATED, REQUEST_LOST, Ctt2, Line
@@ -36,7 +36,7 @@ def exchange(line, data, limit=9000, outcome=OK):
 
 
 def test_worked_bits_of_the_master():
-    """CT-020, CT-021: W5, byte 10 to slave 5A with DO2 = 1 on the line; it is the first byte of reading the ID object."""
+    """CT-020, CT-021: W5, byte 10 to slave 5A with DO2 = 1 on the line: the first byte of reading the ID object."""
     line = Line(setup(), 5, S7A5, Ctt2(0, extended=True))
     assert line.live == 1
     line.run(GAP + 16)
@@ -49,7 +49,8 @@ def test_worked_bits_of_the_slave():
     for swapped in (False, True):
         line = Line(setup(), 5, S7A5, Ctt2(0, extended=True, swapped=swapped)).run(GAP + 47 + 16)
         zero, one = ((0b0000, 0b0100), (0b1000, 0b1100)) if swapped else ((0b0000, 0b1000), (0b0100, 0b1100))
-        assert [answer for _, answer in line.log[GAP + 47:]] == [n for b in "01010000" for n in (one if b == "1" else zero)]
+        expected = [n for b in "01010000" for n in (one if b == "1" else zero)]
+        assert [answer for _, answer in line.log[GAP + 47:]] == expected
 
 
 def test_identification():
@@ -124,11 +125,13 @@ def test_parallel_bits(codes, index, in_mask, out_mask, rest):
 
 
 @pytest.mark.parametrize("request_, response, status", [
-    ("10 05 03", "50 0A 0B 0C", 0), ("11 05 02 01 02", "51", 0), ("12 00 04", "52 01 02 03 04", 0), ("13 09 00", "53", 0),
-    ("1D 01 02 01 77", "5D 08 09", 0), ("10 05 00", "50", 0), ("10 05 03", "90 01", DEVICE), ("11 05 01 09", "91 02", DEVICE),
-    ("12 05 03", "92 02 11 22", DEVICE), ("13 05 00", "93 03", DEVICE), ("1D 01 02 00", "9D 01 02 03 04 05", DEVICE)])
+    ("10 05 03", "50 0A 0B 0C", 0), ("11 05 02 01 02", "51", 0), ("12 00 04", "52 01 02 03 04", 0),
+    ("13 09 00", "53", 0),
+    ("1D 01 02 01 77", "5D 08 09", 0), ("10 05 00", "50", 0), ("10 05 03", "90 01", DEVICE),
+    ("11 05 01 09", "91 02", DEVICE), ("12 05 03", "92 02 11 22", DEVICE), ("13 05 00", "93 03", DEVICE),
+    ("1D 01 02 00", "9D 01 02 03 04 05", DEVICE)])
 def test_messages(request_, response, status):
-    """CT-021, CT-022: all codes and their errors; error objects of unknown length end with the gap; values pause, then go on."""
+    """CT-021, CT-022: all codes and errors; error objects of unknown length end with the gap; values go on after."""
     request_, response = bytes.fromhex(request_), bytes.fromhex(response)
     slave = Ctt2(0x22, inputs=lambda: b"\xCA\xFE", answers={request_: response})
     line = Line(setup(), 7, S755, slave).run(ID_CALLS + 100)
@@ -154,8 +157,8 @@ def test_long_message():
 def test_refused_messages():
     """CT-022: a request without code or of a wrong length, another kind of string, a response that has no room."""
     line = Line(setup(), 7, S755, Ctt2(0x22))
-    for data in (b"", b"\x10\x00", b"\x10\x00\x05\x06", b"\x11\x00\x02\x01", b"\x20\x00\x00", b"\x1D\x01\x02", b"\x1D\x01\x02\x01",
-                 b"\x00\x00\x00"):
+    for data in (b"", b"\x10\x00", b"\x10\x00\x05\x06", b"\x11\x00\x02\x01", b"\x20\x00\x00", b"\x1D\x01\x02",
+                 b"\x1D\x01\x02\x01", b"\x00\x00\x00"):
         assert message(line, data) == ARG
     assert message(line, b"\x10\x00\xE0") == OVERFLOW
     assert line.lib.fc_string(7, MESSAGE, 225, 0) == OVERFLOW
@@ -187,7 +190,7 @@ def test_response_time_out():
 
 
 def test_broken_message_is_tried_again():
-    """CT-020, CT-003: a lost answer makes the slave's message a bit short: a gap, then again; values stay up to three times."""
+    """CT-020, CT-003: a lost answer makes the slave's message short: a gap, then again; twice the values stay."""
     slave = Ctt2(0x02, inputs=lambda: b"\xCA\xFE")
     line = Line(setup(), 7, S755, slave).run(ID_CALLS + 48)
     for n in range(3):
@@ -196,6 +199,32 @@ def test_broken_message_is_tried_again():
         assert (line.status, line.ai[0]) == ((1, 0xCAFE) if n < 2 else (0, 0))
     line.until(lambda: line.status == TV | 1, 100)
     assert line.ai[0] == 0xCAFE
+
+
+def test_broken_error_response():
+    """CT-022, CT-003: an error response of unknown length that lost a bit is no whole number of bytes: transfer error."""
+    request_ = b"\x12\x05\x01"
+    slave = Ctt2(0, answers={request_: b"\x92\x02\x11"})
+    line = Line(setup(), 7, S755, slave).run(ID_CALLS)
+    assert message(line, request_) == 0
+    line.until(lambda: len(slave.levels) == 9, 200)
+    line.call(ANSWER_LOST).until(lambda: not line.lib.fc_string_open(), 100)
+    assert line.lib.fc_string_status() == TRANSFER
+    assert exchange(line, request_) == (DEVICE, b"\x92\x02\x11")
+
+
+def test_two_slaves_one_message():
+    """CT-022: a message belongs to one slave; the cyclic service of the other one goes on, and it may even leave."""
+    env = setup()
+    one = Line(env, 7, S755, Ctt2(0x02, inputs=lambda: b"\x11\x22"))
+    two = Line(env, 9, S755, other := Ctt2(0x02, inputs=lambda: b"\x33\x44"))
+    assert message(one, b"\x10\x00\x05") == 0
+    for _ in range(ID_CALLS + 60):
+        two.call()
+    assert two.ai[0] == 0x3344 and b"\x10\x00\x05" in other.requests and env[1].fc_string_open()
+    env[1].fc_close(9)
+    one.until(lambda: not env[1].fc_string_open(), 500)
+    assert env[1].fc_string_status() == 0 and env[1].fc_string_length() == 6
 
 
 def test_busy_slave():
@@ -211,7 +240,8 @@ def test_busy_slave():
 
 def test_wrong_answers():
     """CT-021, CT-022: a response to something else, or an error response without end, is a broken transfer."""
-    slave = Ctt2(0, answers={b"\x10\x05\x01": b"\x51\x00", b"\x12\x05\x01": b"\x92" + bytes(240), b"\x12\x06\x01": b"\x92"})
+    slave = Ctt2(0, answers={b"\x10\x05\x01": b"\x51\x00", b"\x12\x05\x01": b"\x92" + bytes(240),
+                             b"\x12\x06\x01": b"\x92"})
     line = Line(setup(), 7, S755, slave).run(ID_CALLS)
     for request_ in slave.answers.keys() - {b"\x10\x00\x05"}:
         assert exchange(line, request_)[0] == TRANSFER, request_
@@ -229,7 +259,8 @@ def test_swapped_lines(swapped):
     assert line.ai[0] == 0xCAFE
     line.lib.fc_close(7)
     assert line.ai[0] == 0 and line.status == 0
-    again = Line((line.ffi, line.lib), 7, S755, Ctt2(0x02, inputs=lambda: b"\xBE\xEF", swapped=swapped)).run(ID_CALLS + 48)
+    slave = Ctt2(0x02, inputs=lambda: b"\xBE\xEF", swapped=swapped)
+    again = Line((line.ffi, line.lib), 7, S755, slave).run(ID_CALLS + 48)
     assert again.ai[0] == 0xBEEF
 
 
@@ -245,10 +276,12 @@ def test_swapped_and_back_and_no_message():
     assert line.ai[0] == 0xCAFE
 
 
-@pytest.mark.parametrize("name, value", [("MSB_FIRST", 0), ("RISING_EDGE", 0), ("IDLE", 2), ("IDLE", 0), ("GAP_CALLS", 12)])
+@pytest.mark.parametrize("name, value", [("MSB_FIRST", 0), ("RISING_EDGE", 0), ("IDLE", 2), ("IDLE", 0),
+                                         ("GAP_CALLS", 12)])
 def test_alternatives(name, value):
     """CT-020: the other choices of the table compile and work, each alone."""
-    slave = Ctt2(0x22, inputs=lambda: b"\xCA\xFE", other={f"CTT2_{name}": value}, answers={b"\x12\x05\x01": b"\x92\x01\x02"})
+    slave = Ctt2(0x22, inputs=lambda: b"\xCA\xFE", other={f"CTT2_{name}": value},
+                 answers={b"\x12\x05\x01": b"\x92\x01\x02"})
     line = Line(setup(f"ASI_CTT2_{name}={value}"), 7, S755, slave)
     line.set_ao(0x8421)
     line.run(ID_CALLS + 16 * 12 + 30)
@@ -266,7 +299,7 @@ def test_slow_slave():
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.sampled_from((OK,) * 12 + (REQUEST_LOST, ANSWER_LOST, REPEATED, LATE)), max_size=700), st.booleans())
 def test_bad_line(outcomes, extended):
-    """CT-002, CT-003, CT-020: any loss, repetition or late nibble: every value shown and every put is one that was given."""
+    """CT-002, CT-003, CT-020: any loss, repetition or late nibble: values shown and puts are ones that were given."""
     count = [0]
 
     def inputs():

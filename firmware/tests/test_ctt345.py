@@ -38,8 +38,8 @@ def expected_kind(io, id_, id2):
     """the table of the profiles, written as a table"""
     if id_ == 0xB:
         return SAFETY
-    exact = {(7, 5, 5): TWO, (7, 0xA, 5): TWO, (0xB, 0xA, 5): TWO, (7, 0xA, 7): X4, (7, 0xA, 0xA): X8, (7, 0xA, 8): FOUR,
-             (7, 0xA, 9): FOUR, **{(6, 0, k): FIVE for k in (5, 6, 7, 0xA, 0xB, 0xC)}}
+    exact = {(7, 5, 5): TWO, (7, 0xA, 5): TWO, (0xB, 0xA, 5): TWO, (7, 0xA, 7): X4, (7, 0xA, 0xA): X8,
+             (7, 0xA, 8): FOUR, (7, 0xA, 9): FOUR, **{(6, 0, k): FIVE for k in (5, 6, 7, 0xA, 0xB, 0xC)}}
     if io == 7 and id_ in (1, 2, 3, 4) and (id_, id2) != (4, 0):
         return IN if id2 >= 8 else OUT
     return exact.get((io, id_, id2), NONE)
@@ -55,8 +55,8 @@ def test_kinds():
 def test_live_slaves():
     """CT-001, CT-040: which slaves are live; no engine for 0, 32, above 63, nor for a B index without ID code A."""
     ffi, lib = setup()
-    for io, id_, id2, live in [(7, 3, 0xC, 1), (7, 4, 0, 0), (7, 5, 5, 1), (7, 0xA, 7, 1), (7, 0xA, 0xA, 1), (7, 0xA, 8, 0),
-                               (6, 0, 0xA, 0), (0, 0xB, 0xF, 0), (0, 0, 0xF, 0)]:
+    for io, id_, id2, live in [(7, 3, 0xC, 1), (7, 4, 0, 0), (7, 5, 5, 1), (7, 0xA, 7, 1), (7, 0xA, 0xA, 1),
+                               (7, 0xA, 8, 0), (6, 0, 0xA, 0), (0, 0xB, 0xF, 0), (0, 0, 0xF, 0)]:
         assert lib.fc_open(5, codes(io, id_, id2), 0) == live
         now = ffi.new("uint32_t[2]")
         lib.fc_live(now)
@@ -159,6 +159,15 @@ def test_eight_bits_out_of_order():
     assert line.ai[0] == 0b10101010 and line.status & 1
 
 
+def test_eight_bits_first_nibble_twice():
+    """CT-031, CT-003: the very first nibble confirms selector 0; sent again by a late firmware it must not tear a byte."""
+    slave = Ctt3x8()
+    line = Line(setup(), 5, S7AA, slave)
+    line.set_ao(0xFF)
+    line.call().call(LATE).run(8)
+    assert slave.taken == [0, 0xFF]
+
+
 @pytest.mark.parametrize("defines, other", [(("ASI_CTT3_AA_OFFSET=1",), {"offset": 1}), (("ASI_CTT3_AA_INVERTED=0",),
                                                                                       {"inverted": 0})])
 def test_eight_bits_alternatives(defines, other):
@@ -214,7 +223,8 @@ def test_type_4_placeholder(kind, values):
         line.call(outcome)
     assert line.ai[0] == 0x1234
     line.run(8)
-    assert line.ai[:len(values)] == values and line.status == TV | (1 << len(values)) - 1 | (OV if len(values) == 1 else 0)
+    assert line.ai[:len(values)] == values
+    assert line.status == TV | (1 << len(values)) - 1 | (OV if len(values) == 1 else 0)
     assert line.lib.fc_inputs(5, 7) == 0
     if kind == S7A8:
         for output in (1, 0):
