@@ -120,7 +120,7 @@ class Sender:
         if t == self._first and (new or self._frame is None):
             self._k += self._done                       # a frame that was broken off is sent again
             self._frame, self._done = self._frame_of(self._k), False
-        if self._frame is None or t > self._first:
+        if self._frame is None:
             return 0                                    # a call from before the dialogue: V = 0 whatever it asks for
         self._done |= t == 0
         return _payload(self._frame >> 3 * t & 7)
@@ -422,10 +422,8 @@ class Mux8(Engine):
             self._bits = self.values[0] & 0xFF      # one sample for the four pairs
 
     def _take(self, number, pair):
-        if number == 0:
-            self._pairs.clear()
         self._pairs[number] = pair
-        if number == 3 and len(self._pairs) == 4:
+        if number == 3 and len(self._pairs) == 4:       # with an offset the first round has no pair 0
             self.outputs[0] = sum(pair << 2 * k for k, pair in self._pairs.items())
 
 

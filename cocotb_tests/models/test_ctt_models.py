@@ -156,6 +156,8 @@ def test_w7():
     assert engine.outputs[0] is None                            # no call with I2 = 1 came before the first one
     replay(engine, [(0b001, 6)])
     assert engine.outputs[0] == 0b1010
+    replay(engine, [(0b011, 6)])
+    assert engine.outputs[0] == 0b1010                          # I2 stayed 0: no edge
 
 
 def test_w8():
@@ -309,6 +311,15 @@ def test_ctt1_value_is_taken_whole():
         master.step(t)
     engine.values[0] = 0x1111
     assert master.read(7) == 0x1111 << 2 | 1                    # broken off and begun again: a new one
+    two = ctt.make(7, 3, 0xD, values=(0x0FF0, 0x1111))
+    master = Ctt1Master(Wire(two))
+    for t in (6, 5, 4):
+        master.step(t)
+    assert master.read(7) == 0x0FF0 << 2 | 1                    # ... of the same channel
+    short = ctt.make(7, 1, 8, values=(0xE000,))
+    assert short.exchange(0b0100, 0) == 0b0111
+    short.values[0] = 0
+    assert short.exchange(0b0100, REPEAT_NS) == 0b0111          # the first triple repeated is no new value
 
 
 def test_ctt1_outputs_that_are_not_taken():
@@ -711,7 +722,8 @@ def test_mux8_losses(words, losses, alternative):
                 pairs[s] = answer & 3
                 if s == 3:
                     got.append(sum(p << 2 * k for k, p in pairs.items()))
-                    engine.values[0] = value
+                if s == 1:
+                    engine.values[0] = value                    # in the middle of a round: for the next one
                     expected.append(value)
         assert got == expected[:len(got)] and len(got) == len(words)
         assert engine.outputs[0] == (taken[-1] if taken else None)
