@@ -379,6 +379,7 @@ def test_ctt1_supervision(p0, id, dropped):
     engine.update(last + 500 * MS)
     assert engine.outputs[0] == (None if dropped else 7)
     wire.now = last + 500 * MS
+    assert engine.exchange(0b1000 if master.control == 0 else 0, wire.now) & 7 == 6     # names what it wants
     assert master.step(5) == 6                                  # not taken: the middle of a value, for all it knows
     assert master.write(9 << 2 | 1, 7) == 7 and engine.outputs[0] == 9
 
@@ -544,7 +545,8 @@ CTT2_CHOICES = [{}, {"CTT2_MSB_FIRST": 0}, {"CTT2_RISING_EDGE": 0}, {"CTT2_IDLE"
     ("11 00 05 41 42 43 44 45", "91 01"), ("11 05 00", "91 02"), ("13 05 05 41 42 43 44 45", "53"),
     ("13 06 01 00", "93 01"), ("1D 05 02 05 41 42 43 44 45", "5D 41 42"), ("1D 05 06 05 41 42 43 44 45", "9D 02"),
     ("1D 05 00 05 41 42 43 44 45", "5D"), ("1D 05 05 00", "9D 02"), ("1D 08 01 01 00", "9D 01"),
-    ("00", "AB CD"), ("01 12 34", ""), ("1F 01 02 03", "9F 03"), ("77", "F7 03"), ("05 05", "")])
+    ("00", "AB CD"), ("01 12 34", ""), ("1F 01 02 03", "9F 03"), ("77", "F7 03"),
+    ("05 05", "")])
 @pytest.mark.parametrize("codes", CTT2)
 def test_ctt2_messages(codes, message, response):
     """SL-009, CT-021: every code of the table with its good response and its errors; unknown codes end with a gap."""
