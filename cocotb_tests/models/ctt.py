@@ -25,7 +25,8 @@ PLAIN_ID_OBJECT = bytes((0, 0, 0, 0, 0x22))  # vendor, device, one word each way
 def make(io, id, id2, **options):
     """Engine for a slave with these codes, None when it exchanges plain nibbles (CT-001).
 
-    options: values, strings, invalid, overflow; per kind triples (S-7.1, 7.2), swapped (CTT2), words, closed (safety).
+    options: values, strings, invalid, overflow; per kind triples (S-7.1, 7.2), swapped, busy (CTT2), words, closed
+    (safety).
     ValueError for options of a plain slave, TypeError for one that its kind does not know.
     """
     engine = None
@@ -119,7 +120,7 @@ class Sender:
         if t == self._first and (new or self._frame is None):
             self._k += self._done                       # a frame that was broken off is sent again
             self._frame, self._done = self._frame_of(self._k), False
-        if self._frame is None or t > self._first:
+        if self._frame is None:
             return 0                                    # a call from before the dialogue: V = 0 whatever it asks for
         self._done |= t == 0
         return _payload(self._frame >> 3 * t & 7)
@@ -133,11 +134,14 @@ class Receiver:
         self._first, self._take = triples - 1, take
         self.restart()
 
-    def restart(self):
-        self._want, self._frame = self._first, 0
+    def restart(self, lost=False):
+        """Wants the first triple again. lost: the next one may be any triple of anything, it is not taken."""
+        self._want, self._frame, self._lost = self._first, 0, lost
 
     def step(self, new, three):
-        if new:
+        if new and self._lost:
+            self._lost = False
+        elif new:
             self._frame = self._frame << 3 | _payload(three)
             self._want -= 1
             if self._want < 0:
@@ -148,24 +152,26 @@ class Receiver:
 
 
 class Ctt1(Engine):
-    """S-7.1 .. S-7.4: values of 16 bits with channel, overflow and valid, a triple per call; strings but in S-7.3.
+    """S-7.1 .. S-7.4: values of 16 bits with channel, overflow and valid, a triple per call; S-7.4 has strings.
 
-    triples: length of a value with its E triple, 3 .. 7; below 7 the value is left-aligned in what is there.
+    S-7.1 and S-7.2 have one channel, no E triple and 2 .. 6 triples of the left-aligned value, O and V.
     """
 
     def __init__(self, id, id2, triples=None, **common):
-        self.is_input, self.channels = bool(id2 & 8), (1, 2, 4, 4)[id2 & 3]
-        self.triples = triples or table.CTT1_VALUE_TRIPLES
-        if not 3 <= self.triples <= 7:
-            raise ValueError(f"{self.triples} triples, not 3 .. 7")
-        self._has_strings, self._supervises = id != 3, id == 3 and not self.is_input
-        self._mode = None
+        self.is_input = bool(id2 & 8)
+        if id in (1, 2):
+            # getattr: the numbers are ours (experimental), 15 and 18 bits where the table does not say
+            self.triples = triples or getattr(table, f"CTT1_TRIPLES_7{id}", 4 + id)
+            self.channels = 1
+            if not 2 <= self.triples <= 6:
+                raise ValueError(f"{self.triples} triples, not 2 .. 6")
+        elif triples is not None:
+            raise ValueError(f"triples: S-7.{id} has {table.CTT1_VALUE_TRIPLES}")
+        else:
+            self.triples, self.channels = table.CTT1_VALUE_TRIPLES, (1, 2, 4, 4)[id2 & 3]
+        self._unused = max(18 - 3 * self.triples, 0)            # low bits of a value that a short frame does not carry
+        self._has_strings, self._supervises = id == 4, id == 3 and not self.is_input
         super().__init__(**common)
-
-    @property
-    def _unused(self):
-        """Low bits of a value that a short frame does not carry."""
-        return 16 - (3 * (self.triples - 1) - 2)
 
     def reset(self):
         super().reset()
@@ -175,6 +181,7 @@ class Ctt1(Engine):
         self._set_mode(table.CTT1_PAR_DATA)
 
     def _set_mode(self, mode):
+        """A new dialogue; the control bit goes on alternating."""
         self._mode, self._written = mode, b""
         kinds = {table.CTT1_PAR_ID: ID, table.CTT1_PAR_DIAG: DIAGNOSIS, table.CTT1_PAR_RD: PARAMETERS}
         if mode == table.CTT1_PAR_WR:
@@ -193,18 +200,19 @@ class Ctt1(Engine):
         if self._has_strings:
             modes = (table.CTT1_PAR_ID, table.CTT1_PAR_DIAG, table.CTT1_PAR_RD, table.CTT1_PAR_WR)
             mode = value if value in modes else table.CTT1_PAR_DATA
-            if mode != self._mode or mode != table.CTT1_PAR_DATA:       # a repeated WPAR does not disturb values
+            if mode != self._mode:                                      # a repeated WPAR disturbs nothing
                 self._set_mode(mode)
         return value
 
     def update(self, t_ns):
-        if self._step_ns is None or self._mode != table.CTT1_PAR_DATA or self.is_input:
+        """After such a silence the master may have begun anew, without a way to say so."""
+        if self._step_ns is None or t_ns - self._step_ns < table.CTT1_SLAVE_TIMEOUT_MS * MS:
             return
-        if t_ns - self._step_ns >= table.CTT1_SLAVE_TIMEOUT_MS * MS:
-            self._step_ns = None
-            self._dialogue.restart()
-            if self._supervises and self._parameter & 1:
-                self.outputs = [None] * CHANNELS
+        self._step_ns = None
+        if isinstance(self._dialogue, Receiver):
+            self._dialogue.restart(lost=True)
+        if self._supervises and self._parameter & 1:
+            self.outputs = [None] * CHANNELS
 
     def _exchange(self, nibble, t_ns):
         control, three = _unpack(nibble ^ 15 * table.CTT1_INVERT_OUT)
@@ -219,10 +227,10 @@ class Ctt1(Engine):
         channel = k % self.channels
         data = self.values[channel] & 0xFFFF
         good, over = not self.invalid >> channel & 1, self.overflow >> channel & 1
-        return _channel(channel) << 3 * (self.triples - 1) | data >> self._unused << 2 | over << 1 | good
+        return _channel(channel) << 18 | data >> self._unused << 2 | over << 1 | good
 
     def _take_value(self, frame):
-        channel = _channel(frame >> 3 * (self.triples - 1))
+        channel = _channel(frame >> 18)                                 # 0 where there is no E triple
         if frame & 1 and channel < self.channels:                       # V
             data = frame >> 2 & 0xFFFF >> self._unused
             self.outputs[channel] = data << self._unused
@@ -414,10 +422,8 @@ class Mux8(Engine):
             self._bits = self.values[0] & 0xFF      # one sample for the four pairs
 
     def _take(self, number, pair):
-        if number == 0:
-            self._pairs.clear()
         self._pairs[number] = pair
-        if number == 3 and len(self._pairs) == 4:
+        if number == 3 and len(self._pairs) == 4:       # with an offset the first round has no pair 0
             self.outputs[0] = sum(pair << 2 * k for k, pair in self._pairs.items())
 
 

@@ -79,8 +79,10 @@ def test_options_of_plain_slaves():
         ctt.make(7, 3, 12, swapped=True)
     with pytest.raises(ValueError, match="7 words"):
         ctt.make(0, 11, 0, words=range(7))
-    with pytest.raises(ValueError, match="8 triples"):
-        ctt.make(7, 1, 8, triples=8)
+    with pytest.raises(ValueError, match="7 triples"):
+        ctt.make(7, 1, 8, triples=7)
+    with pytest.raises(ValueError, match="S-7.3 has 7"):
+        ctt.make(7, 3, 8, triples=6)
 
 
 # ---------------------------------------------------------------------------------------------- worked sequences
@@ -154,6 +156,8 @@ def test_w7():
     assert engine.outputs[0] is None                            # no call with I2 = 1 came before the first one
     replay(engine, [(0b001, 6)])
     assert engine.outputs[0] == 0b1010
+    replay(engine, [(0b011, 6)])
+    assert engine.outputs[0] == 0b1010                          # I2 stayed 0: no edge
 
 
 def test_w8():
@@ -307,6 +311,15 @@ def test_ctt1_value_is_taken_whole():
         master.step(t)
     engine.values[0] = 0x1111
     assert master.read(7) == 0x1111 << 2 | 1                    # broken off and begun again: a new one
+    two = ctt.make(7, 3, 0xD, values=(0x0FF0, 0x1111))
+    master = Ctt1Master(Wire(two))
+    for t in (6, 5, 4):
+        master.step(t)
+    assert master.read(7) == 0x0FF0 << 2 | 1                    # ... of the same channel
+    short = ctt.make(7, 1, 8, values=(0xE000,))
+    assert short.exchange(0b0100, 0) == 0b0111
+    short.values[0] = 0
+    assert short.exchange(0b0100, REPEAT_NS) == 0b0111          # the first triple repeated is no new value
 
 
 def test_ctt1_outputs_that_are_not_taken():
@@ -328,15 +341,24 @@ def test_ctt1_before_the_first_triple():
     assert engine.exchange(0b1111, CYCLE_NS * 11) == 0b1000     # there is no triple 7 in a value
 
 
-@pytest.mark.parametrize("triples", [3, 4, 5, 6, 7])
-def test_ctt1_short_values(triples):
-    """SL-009, CT-015: S-7.1 and S-7.2 with fewer triples: the value is left-aligned in what there is."""
-    width = 3 * (triples - 1) - 2
-    engine = ctt.make(7, 1, 8, values=(0xA5C3,), triples=triples)
-    assert Ctt1Master(Wire(engine)).read(triples) == 0xA5C3 >> 16 - width << 2 | 1
-    engine = ctt.make(7, 2, 0, triples=triples)
-    assert Ctt1Master(Wire(engine)).write(0xA5C3 >> 16 - width << 2 | 1, triples) == triples
-    assert engine.outputs[0] == 0xA5C3 >> 16 - width << 16 - width
+@pytest.mark.parametrize("alternative", [{}, {"CTT1_COUNT_UP": 1}])
+@pytest.mark.parametrize("triples", [2, 3, 4, 5, 6])
+def test_ctt1_short_values(triples, alternative):
+    """SL-009, CT-015: S-7.1 and S-7.2: no E triple, one channel, the value left-aligned in what there is."""
+    with choices(**alternative):
+        left = 18 - 3 * triples
+        engine = ctt.make(7, 1, 0xE, values=(0xA5C3, 0x1111), triples=triples)
+        master = Ctt1Master(Wire(engine))
+        for _ in range(2):
+            assert master.read(triples) == 0xA5C3 >> left << 2 | 1
+        engine = ctt.make(7, 2, 2, triples=triples)
+        engine.exchange(15, 0)
+        wire = Wire(engine)
+        assert Ctt1Master(wire).write(0xA5C3 >> left << 2 | 1, triples) == triples
+        assert engine.outputs == [0xA5C3 >> left << left, None, None, None]
+        assert engine.write_parameter(table.CTT1_PAR_ID, 0) == table.CTT1_PAR_ID        # no strings here
+        Ctt1Master(wire).write(0x1234 >> left << 2 | 1, triples)
+        assert engine.outputs[0] == 0x1234 >> left << left
 
 
 @pytest.mark.parametrize("p0, id, dropped", [(1, 3, True), (0, 3, False), (1, 4, False)])
@@ -357,7 +379,9 @@ def test_ctt1_supervision(p0, id, dropped):
     engine.update(last + 500 * MS)
     assert engine.outputs[0] == (None if dropped else 7)
     wire.now = last + 500 * MS
-    assert master.step(0) == 5                                  # wants triple 6 first: this was it
+    assert engine.exchange(0b1000 if master.control == 0 else 0, wire.now) & 7 == 6     # names what it wants
+    assert master.step(5) == 6                                  # not taken: the middle of a value, for all it knows
+    assert master.write(9 << 2 | 1, 7) == 7 and engine.outputs[0] == 9
 
 
 # ---------------------------------------------------------------------------------------------- CTT1 strings
@@ -427,6 +451,21 @@ def test_ctt1_strings_refused():
     for k, row in enumerate(W1):
         assert plain.write_parameter((0xE, 0xD, 0xB, 0x7)[k & 3], 0) == (0xE, 0xD, 0xB, 0x7)[k & 3]
         assert plain.exchange(row[0], k * CYCLE_NS) == row[1]
+
+
+def test_ctt1_write_string_after_a_silence():
+    """SL-009, CT-014: half a second of silence costs the sequence that was running, not the string."""
+    engine = ctt.make(7, 4, 4)
+    wire = Wire(engine)
+    master = Ctt1Master(wire)
+    engine.write_parameter(0x7, 0)
+    master.write(0x414203, 8)
+    for three in (2, 0, 6):
+        master.step(three)
+    wire.now += 500 * MS
+    assert master.step(0) == 7
+    master.write(0x434401, 8)
+    assert engine.strings[ctt.PARAMETERS] == bytes.fromhex("414203434401")
 
 
 def test_ctt1_values_survive_a_parameter():
@@ -506,7 +545,8 @@ CTT2_CHOICES = [{}, {"CTT2_MSB_FIRST": 0}, {"CTT2_RISING_EDGE": 0}, {"CTT2_IDLE"
     ("11 00 05 41 42 43 44 45", "91 01"), ("11 05 00", "91 02"), ("13 05 05 41 42 43 44 45", "53"),
     ("13 06 01 00", "93 01"), ("1D 05 02 05 41 42 43 44 45", "5D 41 42"), ("1D 05 06 05 41 42 43 44 45", "9D 02"),
     ("1D 05 00 05 41 42 43 44 45", "5D"), ("1D 05 05 00", "9D 02"), ("1D 08 01 01 00", "9D 01"),
-    ("00", "AB CD"), ("01 12 34", ""), ("1F 01 02 03", "9F 03"), ("77", "F7 03"), ("05 05", "")])
+    ("00", "AB CD"), ("01 12 34", ""), ("1F 01 02 03", "9F 03"), ("77", "F7 03"),
+    ("05 05", "")])
 @pytest.mark.parametrize("codes", CTT2)
 def test_ctt2_messages(codes, message, response):
     """SL-009, CT-021: every code of the table with its good response and its errors; unknown codes end with a gap."""
@@ -684,7 +724,8 @@ def test_mux8_losses(words, losses, alternative):
                 pairs[s] = answer & 3
                 if s == 3:
                     got.append(sum(p << 2 * k for k, p in pairs.items()))
-                    engine.values[0] = value
+                if s == 1:
+                    engine.values[0] = value                    # in the middle of a round: for the next one
                     expected.append(value)
         assert got == expected[:len(got)] and len(got) == len(words)
         assert engine.outputs[0] == (taken[-1] if taken else None)
