@@ -28,6 +28,7 @@ public:
     virtual bool set_string(unsigned, const uint8_t *, unsigned) { return false; }
     virtual int string(unsigned, uint8_t *, unsigned) const { return -1; }  // -> bytes; -1 also: does not fit
     virtual bool set_safety(const uint8_t *, unsigned) { return false; }
+    virtual bool set_serial(bool, unsigned) { return false; }  // DI2, DI3 swapped; requests refused as busy
 };
 
 }  // namespace asi

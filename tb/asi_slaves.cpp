@@ -407,6 +407,8 @@ int asi_net_set_faults(asi_net *net, int slave, const asi_slave_faults *faults) 
 int asi_net_set_options(asi_net *net, int slave, const asi_slave_options *options) {
     Slave *s = find(net, slave);
     if (!s || !options || options->write_ns < 0) return kBad;
+    const bool serial = s->transaction && s->transaction->set_serial(options->di_swapped, options->busy);
+    if (!serial && (options->di_swapped || options->busy)) return kBad;
     s->options = *options;
     return 0;
 }
