@@ -49,10 +49,10 @@ int copy(const std::vector<uint8_t> &from, uint8_t *to, unsigned max) {
 // A call whose control bit has been served already takes nothing and begins nothing; it is answered all the same.
 class Ctt1 : public Transaction {
 public:
-    // triples: of a value; less than 7: no E triple, the value left-aligned in what is there. strings: S-7.3 has none,
-    // its parameter bits belong to the device; there P0 = 1 means supervised outputs.
-    Ctt1(bool inputs, unsigned channels, unsigned triples, bool strings)
-        : inputs_(inputs), channels_(channels), triples_(triples), strings_(strings) {
+    // triples: of a value; less than 7: no E triple, the value left-aligned in what is there. strings: by the parameter
+    // that S-7.4 leaves to the master. supervised: P0 = 1 means that outputs drop when the dialogue stops (S-7.3).
+    Ctt1(bool inputs, unsigned channels, unsigned triples, bool strings, bool supervised)
+        : inputs_(inputs), channels_(channels), triples_(triples), strings_(strings), supervised_(supervised) {
         reset();
     }
 
@@ -60,7 +60,7 @@ public:
         mode_ = Mode::kData;
         parameter_ = ASI_CTT1_PAR_DATA;
         served_ = !ASI_CTT1_START_TOGGLE;  // so the F of the activation is not a triple
-        accepted_at_ = kLongAgo;
+        accepted_at_ = kNone;
         have_ = 0;
         begin_mode();
     }
@@ -68,33 +68,31 @@ public:
     unsigned exchange(unsigned call, unsigned, int64_t t) override {
         if (ASI_CTT1_INVERT_OUT) call ^= 15;
         const unsigned control = call >> ASI_CTT1_TOGGLE_POS & 1, bits = ASI_CTT1_TOGGLE_POS ? call & 7 : call >> 1;
-        drop_outputs(t);
+        catch_up(t);
         const bool fresh = control != served_;
-        // After a silence within a value the master may have begun anew and has no way to say so: ask for the first
-        // triple and do not take this one.
-        const bool lost = mode_ == Mode::kData && wanted_ != top() && silent(t);
         served_ = control;
         if (fresh) accepted_at_ = t;
         unsigned payload;
-        if (receiving()) {
-            if (fresh && lost) wanted_ = top();
-            else if (fresh) take(in_order(bits));
-            payload = number_of(wanted_);
-        } else {
+        if (!receiving()) {
             payload = in_order(give(number_of(bits), fresh));
+        } else {
+            if (fresh && !lost_) take(in_order(bits));
+            if (fresh) lost_ = false;
+            payload = number_of(wanted_);
         }
         const unsigned echo = control ^ ASI_CTT1_ECHO_INVERTED;
         return ASI_CTT1_TOGGLE_POS ? echo << 3 | payload : payload << 1 | echo;
     }
 
-    void parameter(unsigned value) override {
+    void parameter(unsigned value, int64_t t) override {
+        catch_up(t);
         parameter_ = value;
         const Mode mode = !strings_ ? Mode::kData : value == ASI_CTT1_PAR_ID ? Mode::kId
                           : value == ASI_CTT1_PAR_DIAG ? Mode::kDiagnosis : value == ASI_CTT1_PAR_RD ? Mode::kRead
                           : value == ASI_CTT1_PAR_WR ? Mode::kWrite : Mode::kData;
-        if (mode == mode_ && mode == Mode::kData) return;  // values go on
+        if (mode == mode_) return;  // a repeated WPAR disturbs nothing
         mode_ = mode;
-        begin_mode();  // a string from its beginning; the control bit goes on alternating
+        begin_mode();  // the control bit goes on alternating
     }
 
     bool set_value(unsigned channel, uint16_t value) override {
@@ -110,7 +108,7 @@ public:
     }
     int value(unsigned channel, int64_t now, uint16_t &out) override {
         if (inputs_ || channel >= channels_) return -1;
-        drop_outputs(now);
+        catch_up(now);
         if (!(have_ >> channel & 1)) return 0;
         out = values_[channel];
         return 1;
@@ -127,6 +125,7 @@ public:
 
 private:
     enum class Mode { kData, kId, kDiagnosis, kRead, kWrite };
+    static constexpr int64_t kNone = std::numeric_limits<int64_t>::max();
     static constexpr int64_t kSilence = ASI_CTT1_SLAVE_TIMEOUT_MS * INT64_C(1'000'000);
     static constexpr unsigned kV = 1, kO = 2, kF = 2;  // last two bits of a value, of a sequence
 
@@ -138,22 +137,26 @@ private:
     unsigned top() const { return (mode_ == Mode::kData ? triples_ : ASI_CTT1_SEQUENCE_TRIPLES) - 1; }
     bool has_e() const { return triples_ == ASI_CTT1_VALUE_TRIPLES; }
     unsigned missing_bits() const { return has_e() ? 0 : 3 * (ASI_CTT1_VALUE_TRIPLES - 1 - triples_); }
-    bool silent(int64_t t) const { return t - accepted_at_ >= kSilence; }
     const std::vector<uint8_t> &text() const {
         return texts_[mode_ == Mode::kId ? 0 : mode_ == Mode::kDiagnosis ? 1 : 2];
     }
 
     void begin_mode() {
-        begun_ = complete_ = false;
+        begun_ = complete_ = lost_ = false;
         turn_ = 0;
         wanted_ = top();
         frame_ = 0;
         received_.clear();
     }
 
-    // An output module whose P0 is 1 drops its outputs when the dialogue stops.
-    void drop_outputs(int64_t t) {
-        if (!strings_ && parameter_ & 1 && silent(t)) have_ = 0;
+    // After such a silence the master may have begun anew, and has no way to say so: ask for the first triple, and do
+    // not take the next one, which may be any.
+    void catch_up(int64_t t) {
+        if (accepted_at_ == kNone || t - accepted_at_ < kSilence) return;
+        accepted_at_ = kNone;
+        wanted_ = top();
+        lost_ = true;
+        if (supervised_ && parameter_ & 1) have_ = 0;
     }
 
     // Sending. The first number begins a frame: the next one when the last was complete, else the same anew.
@@ -210,7 +213,7 @@ private:
 
     const bool inputs_;
     const unsigned channels_, triples_;
-    const bool strings_;
+    const bool strings_, supervised_;
     // plant side
     std::array<uint16_t, 4> values_{};
     unsigned invalid_ = 0, overflow_ = 0, have_ = 0;
@@ -220,6 +223,7 @@ private:
     unsigned parameter_, served_;
     int64_t accepted_at_;        // last call with a new control bit
     bool begun_, complete_;      // sending: there is a frame; all of it has been asked for
+    bool lost_;                  // receiving: the next triple is not taken
     unsigned turn_, wanted_, frame_;
     std::vector<uint8_t> received_;
 };
@@ -324,8 +328,8 @@ private:
         }
     }
     void gap() {
-        // only a gap ends a request whose length nobody knows; below kRead is cyclic, from kGood on are responses
-        if (!in_.empty() && !known(in_[0]) && in_[0] >= kRead && in_[0] < kGood) refuse(kNotImplemented);
+        // only a gap ends a request whose length nobody knows; what is below kRead is cyclic and has no error response
+        if (!in_.empty() && !known(in_[0]) && in_[0] >= kRead) refuse(kNotImplemented);
         clear();
     }
     void clear() {
@@ -353,7 +357,7 @@ private:
         return id == objects_.end() || id->second.size() < 5 ? 0 : kBytes[id->second[4] >> shift & 7];
     }
 
-    void refuse(Error error) { reply({static_cast<uint8_t>(in_[0] | kError), error}); }
+    void refuse(Error error) { reply({static_cast<uint8_t>(in_[0] + kError), error}); }
     void serve() {
         if (in_[0] == kGetCyclic) get_cyclic();
         else if (in_[0] == kPutCyclic) put_cyclic();
@@ -392,7 +396,7 @@ private:
             return refuse(kIllegalLength);
         }
         std::copy_n(in_.begin() + static_cast<std::ptrdiff_t>(header), n_write, bytes.begin());
-        Bytes answer = {static_cast<uint8_t>(code | kGood)};
+        Bytes answer = {static_cast<uint8_t>(code + kGood)};
         answer.insert(answer.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n_read));
         reply(std::move(answer));
     }
@@ -556,7 +560,8 @@ std::unique_ptr<Transaction> Transaction::make(unsigned io, unsigned id, unsigne
             const bool shorter = id <= 2;
             const unsigned triples = id == 1   ? ASI_CTT1_TRIPLES_71
                                      : id == 2 ? ASI_CTT1_TRIPLES_72 : ASI_CTT1_VALUE_TRIPLES;
-            return std::make_unique<Ctt1>(id2 >> 3 & 1, shorter ? 1 : kChannels[id2 & 3], triples, id != 3);
+            return std::make_unique<Ctt1>(id2 >> 3 & 1, shorter ? 1 : kChannels[id2 & 3], triples, id == 4,
+                                          id == 3);
         }
         case 5:
             if (id2 == 5) return std::make_unique<Ctt2>();
