@@ -449,13 +449,14 @@ def activate(pair):
 
 @pytest.mark.parametrize("index", INDICES)
 def test_every_nibble_after_every_other(index):
-    """SL-007, SL-009: each kind of slave, all pairs of successive nibbles, each also repeated at once."""
+    """SL-007, SL-009: each kind of slave, all pairs of successive nibbles, each also repeated at once; every second
+    pair comes as fast as a repetition."""
     pair = transacting()
     activate(pair)
     calls = [request_pulses(encode_call("DEXG", index, nibble, index in EXTENDED)) for nibble in range(16)]
     for first in range(16):
         for second in range(16):
-            assert pair.request(calls[first]) and pair.request(calls[second])
+            assert pair.request(calls[first], REPEAT_NS if second & 1 else 150_000) and pair.request(calls[second])
         assert pair.request(calls[first], REPEAT_NS) and pair.request(calls[first], REPEAT_NS)
         assert pair.request(calls[first])
 
@@ -524,10 +525,13 @@ def test_random_ctt1(data):
             talk.triples(range(4 if index == 5 else 6, -1, -1))
         elif what == "value":
             bits = 18 if index == 6 else 21
-            talk.frame(draw(st.integers(0, (1 << bits) - 1)) & ~(6 << 18) | draw(st.integers(0, 1)), bits // 3 - 1)
+            talk.frame(draw(st.integers(0, (1 << bits) - 1)) & ~(4 << 18) | draw(st.integers(0, 1)), bits // 3 - 1)
         elif what == "string" and index in (3, 4):
             mode = draw(st.sampled_from(MODES))
             pair.call("WPAR", index, mode)
+            if draw(st.booleans()):             # WPAR again, within the first sequence
+                talk.triples((7, 6, 5))
+                pair.call("WPAR", index, mode)
             for _ in range(draw(st.integers(1, 4))):
                 if mode == table.CTT1_PAR_WR:
                     talk.frame(draw(st.integers(0, 0xFFFFFF)) | draw(st.integers(0, 1)), 7)
@@ -552,8 +556,8 @@ def test_random_ctt1(data):
 
 MESSAGES = ((0x00,), (0x01, 0x5A, 0xA5), (0x01, 1, 2, 3, 4), (0x10, 0, 5), (0x10, 0, 6), (0x10, 0, 7), (0x10, 3, 2),
             (0x10, 9, 1), (0x11, 3, 4, 1, 2, 3, 4), (0x11, 3, 2, 8, 9), (0x11, 0, 5, 1, 2, 3, 4, 5), (0x12, 3, 1),
-            (0x13, 3, 2, 6, 7), (0x1D, 3, 2, 2, 4, 5), (0x1D, 3, 4, 4, 9, 8, 7, 6), (0x1D, 3, 9, 1, 4), (0x14, 1), (0x10,),
-            (0x50, 3), (0x90, 1), (0x02,))
+            (0x13, 3, 2, 6, 7), (0x1D, 3, 2, 2, 4, 5), (0x1D, 3, 4, 4, 9, 8, 7, 6), (0x1D, 3, 9, 1, 4), (0x14, 1),
+            (0x10,), (0x50, 3), (0x90, 1), (0x02,))
 
 
 @given(st.data())
