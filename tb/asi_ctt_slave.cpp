@@ -9,6 +9,12 @@
 
 #include "asi_ctt_table.h"
 
+// S-7.1, S-7.2: triples of a value, which has no E triple there; for a table without these rows
+#ifndef ASI_CTT1_TRIPLES_71
+#define ASI_CTT1_TRIPLES_71 5
+#define ASI_CTT1_TRIPLES_72 6
+#endif
+
 namespace asi {
 namespace {
 
@@ -22,7 +28,7 @@ class Repetition {
 public:
     void reset() { last_ = kLongAgo; }
     bool operator()(int64_t t) {
-        const bool repeated = t - last_ <= kHold;
+        const bool repeated = t - last_ < kHold;
         last_ = t;
         return repeated;
     }
@@ -40,11 +46,13 @@ int copy(const std::vector<uint8_t> &from, uint8_t *to, unsigned max) {
 // ---------------------------------------------------------------------------------------------- CTT1
 // The receiver of the data names the triple it wants. Inputs and strings that are read: call {control, number}, answer
 // {control, triple}. Outputs and strings that are written: call {control, triple}, answer {control, wanted number}.
-// A call whose control bit has been served already is answered as before and changes nothing.
+// A call whose control bit has been served already takes nothing and begins nothing; it is answered all the same.
 class Ctt1 : public Transaction {
 public:
-    // strings: S-7.3 has none, its parameter bits belong to the device: P0 = 1 there means supervised outputs
-    Ctt1(bool inputs, unsigned channels, bool strings) : inputs_(inputs), channels_(channels), strings_(strings) {
+    // triples: of a value; less than 7: no E triple, the value left-aligned in what is there. strings: by the parameter
+    // that S-7.4 leaves to the master. supervised: P0 = 1 means that outputs drop when the dialogue stops (S-7.3).
+    Ctt1(bool inputs, unsigned channels, unsigned triples, bool strings, bool supervised)
+        : inputs_(inputs), channels_(channels), triples_(triples), strings_(strings), supervised_(supervised) {
         reset();
     }
 
@@ -52,39 +60,37 @@ public:
         mode_ = Mode::kData;
         parameter_ = ASI_CTT1_PAR_DATA;
         served_ = !ASI_CTT1_START_TOGGLE;  // so the F of the activation is not a triple
-        accepted_at_ = kLongAgo;
+        accepted_at_ = kNone;
         have_ = 0;
         begin_mode();
-        payload_ = receiving() ? number_of(wanted_) : 0;
     }
 
     unsigned exchange(unsigned call, unsigned, int64_t t) override {
         if (ASI_CTT1_INVERT_OUT) call ^= 15;
         const unsigned control = call >> ASI_CTT1_TOGGLE_POS & 1, bits = ASI_CTT1_TOGGLE_POS ? call & 7 : call >> 1;
-        drop_outputs(t);
-        if (control != served_) {
-            served_ = control;
-            // After such a silence the master may have begun anew, without a way to say so: ask for the first triple
-            // and do not take this one.
-            const bool lost = t - accepted_at_ > kSilence && accepted_at_ != kLongAgo;
-            accepted_at_ = t;
-            if (!receiving()) {
-                payload_ = in_order(give(number_of(bits)));
-            } else {
-                if (lost) wanted_ = top(); else take(in_order(bits));
-                payload_ = number_of(wanted_);
-            }
+        catch_up(t);
+        const bool fresh = control != served_;
+        served_ = control;
+        if (fresh) accepted_at_ = t;
+        unsigned payload;
+        if (!receiving()) {
+            payload = in_order(give(number_of(bits), fresh));
+        } else {
+            if (fresh && !lost_) take(in_order(bits));
+            if (fresh) lost_ = false;
+            payload = number_of(wanted_);
         }
-        const unsigned echo = served_ ^ ASI_CTT1_ECHO_INVERTED;
-        return ASI_CTT1_TOGGLE_POS ? echo << 3 | payload_ : payload_ << 1 | echo;
+        const unsigned echo = control ^ ASI_CTT1_ECHO_INVERTED;
+        return ASI_CTT1_TOGGLE_POS ? echo << 3 | payload : payload << 1 | echo;
     }
 
-    void parameter(unsigned value) override {
+    void parameter(unsigned value, int64_t t) override {
+        catch_up(t);
         parameter_ = value;
         const Mode mode = !strings_ ? Mode::kData : value == ASI_CTT1_PAR_ID ? Mode::kId
                           : value == ASI_CTT1_PAR_DIAG ? Mode::kDiagnosis : value == ASI_CTT1_PAR_RD ? Mode::kRead
                           : value == ASI_CTT1_PAR_WR ? Mode::kWrite : Mode::kData;
-        if (mode == mode_) return;
+        if (mode == mode_) return;  // a repeated WPAR disturbs nothing
         mode_ = mode;
         begin_mode();  // the control bit goes on alternating
     }
@@ -102,7 +108,7 @@ public:
     }
     int value(unsigned channel, int64_t now, uint16_t &out) override {
         if (inputs_ || channel >= channels_) return -1;
-        drop_outputs(now);
+        catch_up(now);
         if (!(have_ >> channel & 1)) return 0;
         out = values_[channel];
         return 1;
@@ -119,6 +125,7 @@ public:
 
 private:
     enum class Mode { kData, kId, kDiagnosis, kRead, kWrite };
+    static constexpr int64_t kNone = std::numeric_limits<int64_t>::max();
     static constexpr int64_t kSilence = ASI_CTT1_SLAVE_TIMEOUT_MS * INT64_C(1'000'000);
     static constexpr unsigned kV = 1, kO = 2, kF = 2;  // last two bits of a value, of a sequence
 
@@ -127,39 +134,47 @@ private:
     static unsigned in_order(unsigned triple) { return ASI_CTT1_MSB_LEFT ? triple : reversed(triple); }
     static unsigned channel_of(unsigned e) { return ASI_CTT1_E_REVERSED ? reversed(e) : e; }
     bool receiving() const { return mode_ == Mode::kWrite || (mode_ == Mode::kData && !inputs_); }
-    unsigned top() const { return (mode_ == Mode::kData ? ASI_CTT1_VALUE_TRIPLES : ASI_CTT1_SEQUENCE_TRIPLES) - 1; }
+    unsigned top() const { return (mode_ == Mode::kData ? triples_ : ASI_CTT1_SEQUENCE_TRIPLES) - 1; }
+    bool has_e() const { return triples_ == ASI_CTT1_VALUE_TRIPLES; }
+    unsigned missing_bits() const { return has_e() ? 0 : 3 * (ASI_CTT1_VALUE_TRIPLES - 1 - triples_); }
     const std::vector<uint8_t> &text() const {
         return texts_[mode_ == Mode::kId ? 0 : mode_ == Mode::kDiagnosis ? 1 : 2];
     }
 
     void begin_mode() {
-        begun_ = false;
-        triple_ = turn_ = 0;
+        begun_ = complete_ = lost_ = false;
+        turn_ = 0;
         wanted_ = top();
         frame_ = 0;
         received_.clear();
     }
 
-    // An output module whose P0 is 1 drops its outputs when the dialogue stops.
-    void drop_outputs(int64_t t) {
-        if (!strings_ && parameter_ & 1 && t - accepted_at_ > kSilence) have_ = 0;
+    // After such a silence the master may have begun anew, and has no way to say so: ask for the first triple, and do
+    // not take the next one, which may be any.
+    void catch_up(int64_t t) {
+        if (accepted_at_ == kNone || t - accepted_at_ < kSilence) return;
+        accepted_at_ = kNone;
+        wanted_ = top();
+        lost_ = true;
+        if (supervised_ && parameter_ & 1) have_ = 0;
     }
 
-    // Sending. A higher number than the last begins a frame: the next one when the last was complete, else the same.
-    unsigned give(unsigned number) {
-        if (number > top()) return 0;  // the F of an activation, or E of a string
-        if (number == top() || number > triple_) {
-            const unsigned turns = mode_ == Mode::kData ? channels_ : std::max(1u, sequences());
-            if (begun_ && triple_ == 0) turn_ = (turn_ + 1) % turns;
+    // Sending. The first number begins a frame: the next one when the last was complete, else the same anew.
+    unsigned give(unsigned number, bool fresh) {
+        if (number == top() && (fresh || !begun_)) {
+            if (complete_) turn_ = (turn_ + 1) % (mode_ == Mode::kData ? channels_ : std::max(1u, sequences()));
             begun_ = true;
+            complete_ = false;
             frame_ = mode_ == Mode::kData ? value_frame(turn_) : sequence_frame(turn_);
         }
-        triple_ = number;
+        if (!begun_ || number > top()) return 0;  // the F of an activation, or a dialogue from before: V = 0
+        complete_ |= number == 0;
         return frame_ >> 3 * number & 7;
     }
     unsigned value_frame(unsigned channel) const {
         const bool valid = !(invalid_ >> channel & 1), overflow = overflow_ >> channel & 1;
-        return channel_of(channel) << 18 | values_[channel] << 2 | (overflow ? kO : 0) | (valid ? kV : 0);
+        const unsigned e = has_e() ? channel_of(channel) << 18 : 0;
+        return e | values_[channel] >> missing_bits() << 2 | (overflow ? kO : 0) | (valid ? kV : 0);
     }
     unsigned sequences() const { return static_cast<unsigned>(text().size()) / 3; }
     unsigned sequence_frame(unsigned n) const {
@@ -178,9 +193,9 @@ private:
         if (mode_ == Mode::kWrite) take_sequence(); else take_value();
     }
     void take_value() {
-        const unsigned channel = channel_of(frame_ >> 18 & 7);
+        const unsigned channel = has_e() ? channel_of(frame_ >> 18 & 7) : 0;
         if (!(frame_ & kV) || channel >= channels_) return;
-        values_[channel] = static_cast<uint16_t>(frame_ >> 2);
+        values_[channel] = static_cast<uint16_t>(frame_ >> 2 << missing_bits());
         have_ |= 1u << channel;
     }
     void take_sequence() {
@@ -197,30 +212,35 @@ private:
     }
 
     const bool inputs_;
-    const unsigned channels_;
-    const bool strings_;
+    const unsigned channels_, triples_;
+    const bool strings_, supervised_;
     // plant side
     std::array<uint16_t, 4> values_{};
     unsigned invalid_ = 0, overflow_ = 0, have_ = 0;
     std::array<std::vector<uint8_t>, 3> texts_;  // ID, diagnosis, parameters
     // dialogue
     Mode mode_;
-    unsigned parameter_, served_, payload_;
-    int64_t accepted_at_;
-    bool begun_;          // sending: a frame has been begun in this mode
-    unsigned triple_, turn_, wanted_, frame_;
+    unsigned parameter_, served_;
+    int64_t accepted_at_;        // last call with a new control bit
+    bool begun_, complete_;      // sending: there is a frame; all of it has been asked for
+    bool lost_;                  // receiving: the next triple is not taken
+    unsigned turn_, wanted_, frame_;
     std::vector<uint8_t> received_;
 };
 
 // ---------------------------------------------------------------------------------------------- CTT2
-// Clock and data both ways, a bit in two calls. The receiver runs in every call; the sender moves on with every call
-// that is not a repetition, so an answer that was lost does not lose a clock level.
+// Clock and data both ways, a bit in two calls. Both move on with every call that is not a repetition, so an answer
+// that was lost does not lose a clock level. A master that gives up on a call loses one; the gap brings both together.
 class Ctt2 : public Transaction {
 public:
-    Ctt2() { reset(); }
+    Ctt2() {
+        objects_[0] = {0, 0, 0, 0, 0x22};  // nobody's; one word each way
+        reset();
+    }
 
     void reset() override {
         repetition_.reset();
+        last_call_ = 0;
         levels_ = ASI_CTT2_IDLE;
         clock_ = ASI_CTT2_IDLE & 1;
         quiet_calls_ = 0;
@@ -230,11 +250,16 @@ public:
     }
 
     unsigned exchange(unsigned call, unsigned plain, int64_t t) override {
-        const bool repeated = repetition_(t);
-        if (!repeated) levels_ = next_levels();
-        receive(call >> ASI_CTT2_DO_CLOCK & 1, call >> ASI_CTT2_DO_DATA & 1, repeated);
+        const bool repeated = repetition_(t) && call == last_call_;
+        last_call_ = call;
+        if (!repeated) {
+            receive(call >> ASI_CTT2_DO_CLOCK & 1, call >> ASI_CTT2_DO_DATA & 1);
+            levels_ = next_levels();
+        }
+        const unsigned clock = levels_ & 1, data = levels_ >> 1;
         constexpr unsigned kLines = 1u << ASI_CTT2_DI_CLOCK | 1u << ASI_CTT2_DI_DATA;
-        return (plain & ~kLines) | (levels_ & 1) << ASI_CTT2_DI_CLOCK | levels_ >> 1 << ASI_CTT2_DI_DATA;
+        return (plain & ~kLines) | (swapped_ ? data : clock) << ASI_CTT2_DI_CLOCK
+               | (swapped_ ? clock : data) << ASI_CTT2_DI_DATA;
     }
 
     bool set_value(unsigned channel, uint16_t value) override {
@@ -258,11 +283,18 @@ public:
         return object == objects_.end() ? -1 : copy(object->second, bytes, max);
     }
 
+    bool set_serial(bool swapped, unsigned busy) override {
+        swapped_ = swapped;
+        busy_ = busy;
+        return true;
+    }
+
 private:
     using Bytes = std::vector<uint8_t>;
     enum Code : unsigned { kGetCyclic = 0x00, kPutCyclic = 0x01, kRead = 0x10, kWrite = 0x11, kDeviceRead = 0x12,
                            kDeviceWrite = 0x13, kExchange = 0x1D, kGood = 0x40, kError = 0x80 };
-    enum Error : uint8_t { kIllegalIndex = 1, kIllegalLength = 2, kNotImplemented = 3 };
+    enum Error : uint8_t { kIllegalIndex = 1, kIllegalLength = 2, kNotImplemented = 3, kBusy = 4 };
+    static constexpr size_t kLongest = 4 + 255;  // by its length byte; more than is legal
     static constexpr size_t kUnknown = std::numeric_limits<size_t>::max();
 
     // Sending: clock in bit 0, data in bit 1. Half 1 of a bit is before the active edge, half 2 behind it.
@@ -273,14 +305,14 @@ private:
         const unsigned place = n / 2 % 8, bit = out_[n / 16] >> (ASI_CTT2_MSB_FIRST ? 7 - place : place) & 1;
         return bit << 1 | ((n & 1) == ASI_CTT2_RISING_EDGE);
     }
-    void reply(Bytes bytes) {  // begins with the next call
+    void reply(Bytes bytes) {  // begins with the answer to this call
         out_ = std::move(bytes);
         half_ = 0;
     }
 
-    void receive(unsigned clock, unsigned data, bool repeated) {
+    void receive(unsigned clock, unsigned data) {
         if (clock == clock_) {
-            if (!repeated && ++quiet_calls_ >= ASI_CTT2_GAP_CALLS) gap();
+            if (++quiet_calls_ >= ASI_CTT2_GAP_CALLS) gap();
             return;
         }
         quiet_calls_ = 0;
@@ -289,15 +321,15 @@ private:
         byte_ = ASI_CTT2_MSB_FIRST ? byte_ << 1 | data : byte_ >> 1 | data << 7;
         if (++bits_ < 8) return;
         bits_ = 0;
-        if (in_.size() < ASI_CTT2_MESSAGE_BYTES) in_.push_back(static_cast<uint8_t>(byte_));
+        if (in_.size() < kLongest) in_.push_back(static_cast<uint8_t>(byte_));
         if (in_.size() == length()) {
             serve();
             clear();
         }
     }
     void gap() {
-        // only a gap ends a message whose length nobody knows
-        if (!in_.empty() && !known(in_[0]) && in_[0] < kGood) refuse(kNotImplemented);
+        // only a gap ends a request whose length nobody knows; what is below kRead is cyclic and has no error response
+        if (!in_.empty() && !known(in_[0]) && in_[0] >= kRead) refuse(kNotImplemented);
         clear();
     }
     void clear() {
@@ -325,7 +357,7 @@ private:
         return id == objects_.end() || id->second.size() < 5 ? 0 : kBytes[id->second[4] >> shift & 7];
     }
 
-    void refuse(Error error) { reply({static_cast<uint8_t>(in_[0] | kError), error}); }
+    void refuse(Error error) { reply({static_cast<uint8_t>(in_[0] + kError), error}); }
     void serve() {
         if (in_[0] == kGetCyclic) get_cyclic();
         else if (in_[0] == kPutCyclic) put_cyclic();
@@ -351,20 +383,30 @@ private:
         const bool exchange = code == kExchange, write = exchange || code == kWrite || code == kDeviceWrite;
         const bool read = exchange || !write;
         const size_t n_read = read ? in_[2] : 0, header = exchange ? 4 : 3, n_write = in_.size() - header;
+        if (busy_) {
+            busy_--;
+            return refuse(kBusy);
+        }
         const auto object = objects_.find(in_[1]);
         if (object == objects_.end() || (write && in_[1] == 0)) return refuse(kIllegalIndex);  // nobody writes the ID
         Bytes &bytes = object->second;
-        if (n_read > bytes.size() || n_write > bytes.size()) return refuse(kIllegalLength);
+        // objects have a length of their own: written whole, read from the beginning
+        const bool too_long = in_.size() > ASI_CTT2_MESSAGE_BYTES || n_read + 1 > ASI_CTT2_MESSAGE_BYTES;
+        if (too_long || n_read > bytes.size() || (write ? n_write != bytes.size() : n_read == 0)) {
+            return refuse(kIllegalLength);
+        }
         std::copy_n(in_.begin() + static_cast<std::ptrdiff_t>(header), n_write, bytes.begin());
-        Bytes answer = {static_cast<uint8_t>(code | kGood)};
+        Bytes answer = {static_cast<uint8_t>(code + kGood)};
         answer.insert(answer.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n_read));
         reply(std::move(answer));
     }
 
     Repetition repetition_;
-    unsigned levels_, clock_, quiet_calls_, bits_, byte_;
+    unsigned last_call_, levels_, clock_, quiet_calls_, bits_, byte_;
     Bytes in_, out_;
     size_t half_;  // of out_, half bits sent
+    bool swapped_ = false;
+    unsigned busy_ = 0;
     std::array<uint16_t, 4> inputs_{}, outputs_{};
     unsigned have_;
     std::map<unsigned, Bytes> objects_;  // by index; 0 is the ID object
@@ -515,7 +557,11 @@ std::unique_ptr<Transaction> Transaction::make(unsigned io, unsigned id, unsigne
         case 1: case 2: case 3: case 4: {
             if (id == 4 && id2 == 0) return nullptr;  // S-7.4 in its 4I/4O mode
             constexpr std::array<uint8_t, 4> kChannels = {1, 2, 4, 4};
-            return std::make_unique<Ctt1>(id2 >> 3 & 1, kChannels[id2 & 3], id != 3);
+            const bool shorter = id <= 2;
+            const unsigned triples = id == 1   ? ASI_CTT1_TRIPLES_71
+                                     : id == 2 ? ASI_CTT1_TRIPLES_72 : ASI_CTT1_VALUE_TRIPLES;
+            return std::make_unique<Ctt1>(id2 >> 3 & 1, shorter ? 1 : kChannels[id2 & 3], triples, id == 4,
+                                          id == 3);
         }
         case 5:
             if (id2 == 5) return std::make_unique<Ctt2>();

@@ -19,7 +19,7 @@ public:
     virtual void reset() = 0;  // power-up, RES, watchdog; what the plant side has set stays
     // An accepted DEXG: I3..I0 as on the line; `plain` is what a plain slave would answer. -> answer I3..I0
     virtual unsigned exchange(unsigned call, unsigned plain, int64_t t) = 0;
-    virtual void parameter(unsigned) {}  // an accepted WPAR
+    virtual void parameter(unsigned, int64_t) {}  // an accepted WPAR
 
     // The plant side; false or a negative number: this kind of slave has no such thing, and nothing changed.
     virtual bool set_value(unsigned, uint16_t) { return false; }
@@ -28,6 +28,7 @@ public:
     virtual bool set_string(unsigned, const uint8_t *, unsigned) { return false; }
     virtual int string(unsigned, uint8_t *, unsigned) const { return -1; }  // -> bytes; -1 also: does not fit
     virtual bool set_safety(const uint8_t *, unsigned) { return false; }
+    virtual bool set_serial(bool, unsigned) { return false; }  // DI2, DI3 swapped; requests refused as busy
 };
 
 }  // namespace asi

@@ -171,7 +171,7 @@ unsigned Slave::data_exchange(unsigned data, int64_t t) {
     outputs_ = static_cast<uint8_t>((data & payload) | (0xF & ~payload));
     const unsigned echo = kOutputBits[io()] & payload;
     const unsigned plain = (outputs_ & echo) | (inputs & ~echo & 0xF);
-    return transaction ? transaction->exchange(data, plain, t) : plain;
+    return transaction && !corrupt_ ? transaction->exchange(data, plain, t) : plain;  // corrupt: IO = ID = F, plain
 }
 
 bool Slave::request(unsigned call, int64_t now, int64_t last, unsigned &answer) {
@@ -197,7 +197,7 @@ bool Slave::request(unsigned call, int64_t now, int64_t last, unsigned &answer) 
         if (i4) {
             parameter_ = static_cast<uint8_t>(extended() ? 8 | low : info & 15);
             dexg_disabled_ = false;
-            if (transaction) transaction->parameter(parameter_);
+            if (transaction && !corrupt_) transaction->parameter(parameter_, last);
             answer = parameter_;
         } else {
             if (dexg_disabled_) return false;
@@ -407,6 +407,8 @@ int asi_net_set_faults(asi_net *net, int slave, const asi_slave_faults *faults) 
 int asi_net_set_options(asi_net *net, int slave, const asi_slave_options *options) {
     Slave *s = find(net, slave);
     if (!s || !options || options->write_ns < 0) return kBad;
+    const bool serial = s->transaction && s->transaction->set_serial(options->di_swapped, options->busy);
+    if (!serial && (options->di_swapped || options->busy)) return kBad;
     s->options = *options;
     return 0;
 }

@@ -89,7 +89,7 @@ public:
 
     uint8_t inputs, periphery_fault = 0;
     asi_slave_faults faults{};
-    asi_slave_options options{kWriteTime, 0, 0, 0, 0};
+    asi_slave_options options{kWriteTime, 0, 0, 0, 0, 0, 0};
     std::unique_ptr<Transaction> transaction;  // null: plain nibbles
 
 private:

@@ -55,6 +55,8 @@ typedef struct {
     uint8_t id1_locked;   /* 1: WID1 that changes the low three bits of ID1 is not answered */
     uint8_t old;          /* 1: RID1 and RID2 are not answered */
     uint8_t sel_at_zero;  /* 1: at address 0 an A/B slave obeys the select of its ID1 bit 3; 0: it obeys Sel = 0 */
+    uint8_t di_swapped;   /* CTT2: clock on DI2 and data on DI3, the other way round than in the table */
+    uint8_t busy;         /* CTT2: so many acyclic requests from now on are refused with standard error 4 */
 } asi_slave_options;
 int      asi_net_set_options(asi_net *net, int slave, const asi_slave_options *options);
 /* Combined transactions (SL-009): the slave's kind follows from its codes, as in CT-001. Plain slaves, and kinds that

@@ -113,19 +113,24 @@ class Master:
                 return out
 
     # CTT2: a bit in two calls
+    tail = []
+
     def levels(self, clock, data, repeated=False, lost=False):
         """One call with these levels, DO2 and DO3 = 1. -> answer nibble"""
         nibble = 12 | data << table.CTT2_DO_DATA | clock << table.CTT2_DO_CLOCK
         return self.lose_answer(nibble) if lost else self.call(nibble, repeated)
 
     def send(self, message, repeated=False, lost=False):
-        """-> answers to all calls."""
-        return [self.levels(clock, byte >> bit & 1, repeated, lost)
-                for byte in bytes(message) for bit in range(7, -1, -1) for clock in (0, 1)]
+        """-> answers to all calls. The answer to the last one may be the first of a response."""
+        answers = [self.levels(clock, byte >> bit & 1, repeated, lost)
+                   for byte in bytes(message) for bit in range(7, -1, -1) for clock in (0, 1)]
+        self.tail = answers[-1:]
+        return answers
 
     def receive(self, calls, **options):
-        """Idle calls -> whole bytes from the slave."""
-        return self.decode([self.levels(1, 1, **options) for _ in range(calls)])
+        """Idle calls -> whole bytes from the slave, with those that came since the last call of send()."""
+        tail, self.tail = self.tail, []
+        return self.decode(tail + [self.levels(1, 1, **options) for _ in range(calls)])
 
     @staticmethod
     def decode(answers):
@@ -160,13 +165,14 @@ def test_kinds():
         return True
 
     for id_code in (1, 2, 3, 4):
-        assert can("set_value", 0, 1, io=7, id=id_code, id2=0xC) and not can("value", 0, io=7, id=id_code, id2=0xC)
+        assert can("set_value", 0, 1, io=7, id=id_code, id2=0xE) and not can("value", 0, io=7, id=id_code, id2=0xE)
+        assert can("set_value", 1, 1, io=7, id=id_code, id2=0xE) == (id_code > 2)
         assert can("value", 0, io=7, id=id_code, id2=4) and not can("set_value", 0, 1, io=7, id=id_code, id2=4)
         assert not can("set_value", 0, 1, io=6, id=id_code, id2=0xC)
     for id2, channels in ((0xC, 1), (0xD, 2), (0xE, 4), (0xF, 4), (8, 1)):
         assert [can("set_value", k, 1, io=7, id=3, id2=id2) for k in range(5)] == [k < channels for k in range(5)]
     assert not can("value", 0, io=7, id=4, id2=0)                           # S-7.4 in its 4I/4O mode
-    assert can("set_string", 0, b"abc", **STRINGS) and not can("set_string", 0, b"abc", **ANALOG, id2=0xC)
+    assert [can("set_string", 0, b"abc", io=7, id=id_code, id2=0xC) for id_code in (1, 2, 3, 4)] == [False] * 3 + [True]
     for codes in (dict(io=7, id=5), dict(io=7, id=0xA), dict(io=0xB, id=0xA)):
         assert can("set_value", 3, 1, **codes, id2=5) and not can("set_value", 3, 1, **codes, id2=6)
     assert can("value", 0, io=7, id=0xA, id2=7) and not can("set_value", 0, 1, io=7, id=0xA, id2=7)
@@ -257,14 +263,18 @@ def test_input_restart():
     assert m.read_value()[0] == 0
 
 
-def test_shorter_values():
-    """SL-009, CT-015: S-7.1 and S-7.2 inputs answer a master that asks for the last triples only."""
-    for id_code in (1, 2):
-        m = Master(8, io=7, id=id_code, id2=8)
-        m.net.set_value(m.slave, 0, 0b1011)
-        assert m.read(1) == 0b1011_0_1 == m.read(1)
-        m.net.set_value(m.slave, 0, 0b0100)
-        assert m.read(1) == 0b0100_0_1
+@pytest.mark.parametrize("id_code, triples", [(1, 5), (2, 6)])
+def test_shorter_values(id_code, triples):
+    """SL-009, CT-015: S-7.1 and S-7.2 have one channel, no E triple and fewer triples, left-aligned."""
+    assert getattr(table, f"CTT1_TRIPLES_7{id_code}", triples) == triples
+    bits = 3 * triples - 2
+    m = Master(8, io=7, id=id_code, id2=0xA)
+    m.net.set_value(m.slave, 0, 0xABCD)
+    for _ in range(2):
+        assert m.read(triples - 1) == 0xABCD >> 16 - bits << 2 | 1
+    m = Master(8, io=7, id=id_code, id2=2)
+    assert m.write(0xABCD >> 16 - bits << 2 | 1, triples - 1) == [*range(triples - 2, -1, -1), triples - 1]
+    assert m.net.value(m.slave) == 0xABCD & ~((1 << 16 - bits) - 1)
 
 
 @pytest.mark.parametrize("loss", ["answer", "request", "repetition"])
@@ -321,9 +331,9 @@ def test_supervised_outputs(id_code, parameter, kept):
     m.parameter(parameter)
     m.write_value(0, 5)
     end = m.line.t + table.CTT1_SLAVE_TIMEOUT_MS * MS - CYCLE
-    m.net.advance(end)
+    m.net.advance(end - 1)
     assert m.net.value(m.slave) == 5
-    m.net.advance(end + 1)
+    m.net.advance(end)
     assert m.net.value(m.slave) == (5 if kept else None)
 
 
@@ -331,11 +341,12 @@ def test_output_after_a_silence():
     """SL-009, CT-002, CT-012: after 0.5 s a broken-off value is not completed by another one: the slave asks for 6."""
     m = Master(9, **ANALOG, id2=4)
     assert m.write_value(0, 0x1111)[-1] == 6
-    assert [m.ask(7) for _ in range(3)] == [5, 4, 3]
-    m.line.wait(table.CTT1_SLAVE_TIMEOUT_MS * MS)
-    assert m.ask(0) == 6
-    m.write_value(0, 0x2222)
-    assert m.net.value(m.slave) == 0x2222
+    for begun in (3, 0):        # within a value and between two
+        assert [m.ask(7) for _ in range(begun)] == [5, 4, 3][:begun]
+        m.line.wait(table.CTT1_SLAVE_TIMEOUT_MS * MS)
+        assert m.ask(0) == 6
+        m.write_value(0, 0x2222 + begun)
+        assert m.net.value(m.slave) == 0x2222 + begun
 
 
 def test_reset_ends_a_value():
@@ -435,8 +446,8 @@ def test_w6_answer_bits():
     m = Master(5, **SERIAL)
     m.net.set_string(m.slave, 0, ID_OBJECT)
     m.send([0x10, 0, 5])
-    m.words.clear()
-    m.receive(16)
+    m.words = m.words[-1:]      # the answer to the last call is the first of the response
+    m.receive(15)
     zero, one = (0x01, 0x23), (0x13, 0x31)
     assert [w for _, w in m.words] == [*zero, *one, *zero, *one, *zero * 4]
 
@@ -447,7 +458,7 @@ def test_ctt2_parallel_bits(codes):
     m = Master(5, inputs=0b0010, **codes)
     m.net.set_string(m.slave, 0, ID_OBJECT)
     answers = m.send([0x10, 0, 5])
-    assert {a >> 2 for a in answers} == {3}                                 # both lines idle
+    assert {a >> 2 for a in answers[:-1]} == {3}                            # both lines idle
     if codes["io"] == 7:
         assert {a & 3 for a in answers} == {2}
     m.call(0b0111)
@@ -465,13 +476,44 @@ def test_ctt2_messages(option):
     m.net.set_string(m.slave, 3, b"abcd")
     for message, answer in (
             ((0x10, 0, 5), b"\x50" + ID_OBJECT), ((0x10, 3, 2), b"\x50ab"), ((0x12, 3, 4), b"\x52abcd"),
-            ((0x10, 3, 5), b"\x90\x02"), ((0x10, 9, 1), b"\x90\x01"), ((0x12, 9, 1), b"\x92\x01"),
-            ((0x11, 3, 2, 0x41, 0x42), b"\x51"), ((0x10, 3, 4), b"\x50ABcd"), ((0x13, 3, 1, 0x7A), b"\x53"),
-            ((0x11, 0, 1, 9), b"\x91\x01"), ((0x13, 9, 1, 9), b"\x93\x01"), ((0x11, 3, 5, 1, 2, 3, 4, 5), b"\x91\x02"),
-            ((0x1D, 3, 3, 1, 0x43), b"\x5DCBc"), ((0x1D, 9, 1, 1, 0), b"\x9D\x01"), ((0x1D, 3, 5, 0), b"\x9D\x02"),
-            ((0x14, 3), b"\x94\x03"), ((0x1F,), b"\x9F\x03"), ((0x50,), b"")):
+            ((0x10, 3, 5), b"\x90\x02"), ((0x10, 3, 0), b"\x90\x02"), ((0x10, 9, 1), b"\x90\x01"),
+            ((0x12, 9, 1), b"\x92\x01"), ((0x11, 3, 4, *b"ABCD"), b"\x51"), ((0x10, 3, 4), b"\x50ABCD"),
+            ((0x13, 3, 4, *b"efgh"), b"\x53"), ((0x11, 0, 5, 1, 2, 3, 4, 5), b"\x91\x01"),
+            ((0x13, 9, 1, 9), b"\x93\x01"), ((0x11, 3, 5, 1, 2, 3, 4, 5), b"\x91\x02"),
+            ((0x11, 3, 3, 1, 2, 3), b"\x91\x02"), ((0x1D, 3, 3, 4, *b"CBcd"), b"\x5DCBc"),
+            ((0x1D, 3, 0, 4, *b"CBcd"), b"\x5D"), ((0x1D, 9, 1, 1, 0), b"\x9D\x01"), ((0x1D, 3, 5, 0), b"\x9D\x02"),
+            ((0x14, 3), b"\x94\x03"), ((0x1F,), b"\x9F\x03"), ((0x50,), b"\xD0\x03"), ((0x02,), b"")):
         assert m.message(*message, answer=len(answer) + 1, **option) == answer, message
     assert m.net.string(m.slave, 3) == b"CBcd"
+
+
+def test_ctt2_busy():
+    """SL-009, CT-021: a busy slave refuses acyclic requests with error 4, so many as it was told, and works then."""
+    m = Master(5, **SERIAL)
+    m.net.set_string(m.slave, 0, ID_OBJECT)
+    m.net.set_options(m.slave, busy=2)
+    assert [m.message(0x10, 0, 5) for _ in range(3)] == [b"\x90\x04", b"\x90\x04", b"\x50" + ID_OBJECT]
+    with pytest.raises(NativeError):
+        m.net.set_options(m.net.add(6), busy=1)
+
+
+def test_ctt2_swapped():
+    """SL-009, CT-024: W6 in the swapped map: clock on DI2, data on DI3."""
+    m = Master(5, **SERIAL)
+    m.net.set_options(m.slave, di_swapped=True)
+    m.send([0x10, 0])
+    answers = m.send([5])[-1:] + [m.levels(1, 1) for _ in range(15)]
+    zero, one = (0b0000, 0b0100), (0b1000, 0b1100)
+    assert answers == [*zero, *one, *zero, *one, *zero * 4]
+
+
+def test_ctt2_longest_messages():
+    """SL-009, CT-021: 224 bytes with the header are a message, more is refused as too long."""
+    for length, answer in ((221, b"\x51"), (222, b"\x91\x02"), (255, b"\x91\x02")):
+        m = Master(5, **SERIAL)
+        m.net.set_string(m.slave, 1, bytes(length))
+        assert m.message(0x11, 1, length, *range(length), answer=2) == answer
+        assert m.net.string(m.slave, 1) == (bytes(range(length)) if length == 221 else bytes(length))
 
 
 @pytest.mark.parametrize("configuration, out_bytes, in_bytes", [
@@ -520,7 +562,7 @@ def test_ctt2_lost_request():
                 nibble = 12 | (byte >> bit & 1) << 1 | clock
                 m.lose_request(nibble)
                 m.call(nibble)
-    answers = []
+    answers = [0]       # the response has begun
     for _ in range(16 * 6 + 2):
         m.lose_request(0xF)
         answers.append(m.call(0xF))
@@ -533,7 +575,8 @@ def test_ctt2_new_request_replaces_the_answer():
     m.net.set_string(m.slave, 0, ID_OBJECT)
     m.net.set_string(m.slave, 1, b"xy")
     m.send([0x10, 0, 5])
-    running = m.send([0x10, 1, 2])
+    first = m.tail
+    running = first + m.send([0x10, 1, 2])[:-1]
     assert m.decode(running) == b"\x50" + ID_OBJECT[:2]
     assert m.receive(60) == b"\x50xy"
 
@@ -664,8 +707,8 @@ def test_safety_word_is_held():
     """SL-009, CT-060, CT-003: a word stays for 224 us after an answered call, also an answer nobody heard."""
     m = Master(8, io=7, id=0xB)
     call = encode_call("DEXG", 8, 0xF)
-    assert m.raw(call, 146 * US) == m.raw(call, 146 * US) == WORDS[1]       # last pulse to last pulse: 224 us
-    assert m.raw(call, 147 * US) == WORDS[1]
+    assert m.raw(call, 145 * US) == m.raw(call, 145 * US) == WORDS[1]       # last pulse to last pulse: 223 us
+    assert m.raw(call, 146 * US) == WORDS[1]
     assert m.raw(call) == WORDS[2]
     assert m.lose_answer(0xF) == WORDS[3]
     m.lose_request(0xF)

@@ -140,8 +140,8 @@ class Net:
         return slave
 
     def set_options(self, slave, write_ns=WRITE_NS, **flags):
-        """SL-010: write_ns, time of a memory write; write_fails, id1_locked, old, sel_at_zero: what is not named is
-        off (meaning: asi_slave_options in tb/asi_tb.h)."""
+        """SL-010: write_ns, time of a memory write; write_fails, id1_locked, old, sel_at_zero; CTT2: di_swapped, busy:
+        what is not named is off (meaning: asi_slave_options in tb/asi_tb.h)."""
         options = self._ffi.new("asi_slave_options *", dict(flags, write_ns=write_ns))
         _check(self._lib.asi_net_set_options(self._net, slave, options), f"options of slave {slave}")
 
