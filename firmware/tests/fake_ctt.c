@@ -27,7 +27,11 @@ void asi_ctt_close(asi_ctt_t *c, unsigned index)
     }
 }
 unsigned asi_ctt_first(asi_ctt_t *c, unsigned index, unsigned outputs) { (void)c; (void)index; return outputs; }
-unsigned asi_ctt_call(asi_ctt_t *c, unsigned index, const asi_ctt_call_t *call) { (void)c; (void)index; return call->outputs; }
+unsigned asi_ctt_call(asi_ctt_t *c, unsigned index, const asi_ctt_call_t *call) 
+{
+    (void)c; (void)index;
+    return call->outputs;
+}
 unsigned asi_ctt_inputs(const asi_ctt_t *c, unsigned index, unsigned answer) { (void)c; (void)index; return answer; }
 void asi_ctt_cycle(asi_ctt_t *c, const asi_list_t *las, const asi_list_t *called, const asi_list_t *failed,
                    const uint16_t codes[ASI_INDICES], uint32_t in[ASI_IMAGE_WORDS], uint32_t out[ASI_IMAGE_WORDS])

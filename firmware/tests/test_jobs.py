@@ -23,9 +23,9 @@ EVER = 10**6
 
 
 class Line:
-    """The core, a sequencer with one extra slot, and slaves. `calls`: management calls of jobs as (payload, error, data).
+    """The core, a sequencer with one extra slot, and slaves. `calls`: calls of jobs as (payload, error, data).
 
-    fault(k, call, attempt): what happens to attempt number 0, 1, 2 of the k-th job call: None, "deaf" (the slave does not
+    fault(k, call, attempt): what happens to attempt 0, 1, 2 of the k-th job call: None, "deaf" (the slave does not
     hear it) or "mute" (the answer is lost).
     """
 
@@ -85,7 +85,7 @@ class Line:
 
     def cycle(self):
         p, lost = self.port, []
-        if not p.cycle:
+        if not p.cycle and (p.idle or not p.line):  # one that is stopped runs to its end
             return False
         las = self.read()["las"]
         for i in range(1, 64):
@@ -148,7 +148,8 @@ class Line:
         assert {i for i in range(64) if s["cdi"][i] != 0xFFFF} <= s["lds"]
         good = s["lds"] == self.lps and all(s["cdi"][i] == self.pcd[i] for i in self.lps)
         assert ("config_ok" in s["flags"]) == good
-        missing, wrong = self.lps - s["lds"], {i for i in s["lds"] - {0} if i not in self.lps or s["cdi"][i] != self.pcd[i]}
+        missing = self.lps - s["lds"]
+        wrong = {i for i in s["lds"] - {0} if i not in self.lps or s["cdi"][i] != self.pcd[i]}
         assert ("auto_address_available" in s["flags"]) == (
             self.auto and self.protected and len(missing) == 1 and not wrong)
 
@@ -289,7 +290,7 @@ def test_refusals_of_parameters():
 
 
 def test_refusals_of_the_state():
-    """FN-022, FN-032, FN-033: arguments first, then POWER, OFFLINE, STATE, BUSY, then what the slave is; nothing changes."""
+    """FN-022, FN-032, FN-033: arguments first, then POWER, OFFLINE, STATE, BUSY, then the slave; nothing changes."""
     m = Line([std(3), std(0)])
     assert m.begin(CHANGE, 3, 3) == ARG and m.begin(CHANGE, 9, 4) == STATE
     m.start()
@@ -314,7 +315,7 @@ TABLE = {28: "RES", 20: "RES", 16: "RDIO", 24: "RDIO", 17: "RDID", 25: "RDID", 1
 
 
 def test_execute_takes_the_legal_set_only():
-    """FN-022, CA-003: of all numbers and codes exactly those of the table are sent; DELA, ADRA, DEXG, WPAR, PRGM never."""
+    """FN-022, CA-003: of all numbers and codes exactly the table's are sent; DELA, ADRA, DEXG, WPAR, PRGM never."""
     m = Line([std(3)]).start()
     for number in range(33):
         for info in range(33):
@@ -330,7 +331,8 @@ def test_execute_takes_the_legal_set_only():
 
 def test_execute_answers():
     """FN-022: the slave's answer is the data; A and B slaves through the code, address 0 with both selects; R1."""
-    slaves = [std(3, io=5, id=2, id1=6, id2=9), ab(5, io=1, id1=3), ab(37, io=4, id1=11, fault=True), ab(0, zero_sel="1", io=2)]
+    slaves = [std(3, io=5, id=2, id1=6, id2=9), ab(5, io=1, id1=3), ab(37, io=4, id1=11, fault=True),
+              ab(0, zero_sel="1", io=2)]
     m = Line(slaves).start()
     for number, info, data in ((3, 16, 5), (3, 17, 2), (3, 18, 6), (3, 19, 9), (5, 16, 1), (5, 24, 4), (5, 26, 11),
                                (5, 30, 0), (5, 22, 2), (5, 23, 2), (3, 31, 0), (0, 24, 2), (0, 13, 0)):
@@ -415,7 +417,7 @@ def test_change_of_a_standard_slave():
 @pytest.mark.parametrize("zero_sel", ["0", "1", "id1", "both"])
 @pytest.mark.parametrize("old, new", [(5, 37), (37, 5), (5, 6), (37, 38), (5, 60), (0, 5), (0, 37)])
 def test_change_of_an_ab_slave(old, new, zero_sel):
-    """AD-003, AD-007: WID1 only where the select changes, with bit 3 only; whatever select the slave obeys at address 0."""
+    """AD-003, AD-007: WID1 only where the select changes, bit 3 only; whatever select it obeys at address 0."""
     m = Line([ab(old, id1=3 | (8 if old > 31 else 0), zero_sel=zero_sel, write_us=12_000), std(20)]).start().rounds(1)
     assert m.read()["lds"] == {old, 20}
     assert m.do(CHANGE, old, new) == 0
@@ -438,7 +440,7 @@ def test_pair_on_one_number():
 
 
 def test_change_to_and_from_zero():
-    """AD-002: new address 0 ends with the deleted address, which is volatile; from there the slave gets its next one."""
+    """AD-002: new address 0 ends with the deleted address, which is volatile; then the slave gets its next one."""
     m = Line([std(3), std(4)]).start()
     assert m.do(CHANGE, 3, 0) == 0 and m.names() == ["DELA 3", "RID1 0"]
     assert m.read()["lds"] == {0, 4} and m.read()["cdi"][0] == m.slaves[0].codes and m.slaves[0].memory == (3, 15)
@@ -462,8 +464,8 @@ def test_refusals_of_a_change():
     m = Line([std(3), ab(5), ab(38), std(7, io=6, id=0, id2=0xB), std(8, io=6, id=0, id2=6), std(9, io=6, id=0, id2=5),
               ab(41, present=False)]).start()
     cases = [(3, 3, ARG), (0, 0, ARG), (3, 32, ARG), (32, 3, ARG), (64, 3, ARG), (3, 64, ARG), (4, 10, NOT_DETECTED),
-             (0, 10, NOT_DETECTED), (3, 5, USED), (3, 40, ARG), (3, 6, USED), (5, 35, USED), (38, 35, USED), (7, 2, USED),
-             (7, 30, USED)]
+             (0, 10, NOT_DETECTED), (3, 5, USED), (3, 40, ARG), (3, 6, USED), (5, 35, USED), (38, 35, USED),
+             (7, 2, USED), (7, 30, USED)]
     for old, new, status in cases:
         assert m.begin(CHANGE, old, new) == status, (old, new)
     m.slaves.append(std(0, clock=lambda: 0))
@@ -509,7 +511,7 @@ def test_id1_that_does_not_last():
 
 
 def test_protected_mode_activates_what_is_projected():
-    """AD-006, EX-009: after the change the slave is active where its new address is projected with its codes, only there."""
+    """AD-006, EX-009: after the change the slave is active only where its new address is projected so."""
     m = Line([std(3), std(4)], projected=[std(4), std(9)], protected=True).start()
     assert m.do(CHANGE, 3, 9) == 0 and m.read()["las"] == {4, 9} and "config_ok" in m.read()["flags"]
     assert m.do(CHANGE, 9, 11) == 0 and m.read()["las"] == {4} and 11 in m.read()["lds"]
@@ -544,9 +546,9 @@ def clean_length(scene):
 @pytest.mark.parametrize("kind", ["deaf", "mute"])
 @pytest.mark.parametrize("scene", SCENES)
 def test_failure_at_every_step(scene, kind):
-    """AD-002, AD-003, AD-004, AD-005, AD-006: every call of the sequence fails once (one attempt), wholly (all three) and
-    for ever (this call and all equal ones), heard by the slave or not. The slave is always at its old or new address, in
-    the lists there; only a call that never gets through may leave it at address 0, where it is shown."""
+    """AD-002, AD-003, AD-004, AD-005, AD-006: every call of the sequence fails once (one attempt), wholly (three) and
+    for ever (this call and all equal ones), heard by the slave or not. The slave is always at its old or new address,
+    in the lists there; only a call that never gets through may leave it at address 0, where it is shown."""
     slaves, old, new = SCENES[scene]
     outcomes = Counter()
     for step in range(clean_length(scene)):
@@ -586,8 +588,8 @@ def test_failure_at_every_step(scene, kind):
 @pytest.mark.parametrize("scene", ["standard", "a to b"])
 @pytest.mark.parametrize("unplugged_for", [1, 12, EVER])
 def test_slave_pulled_at_every_step(scene, unplugged_for):
-    """AD-004: the slave is pulled before each call of the sequence, for a moment or for good: an error or success, never a
-    hang; when it is back it is found wherever its memory says."""
+    """AD-004: the slave is pulled before each call of the sequence, for a moment or for good: an error or success,
+    never a hang; when it is back it is found wherever its memory says."""
     slaves, old, new = SCENES[scene]
     for step in range(clean_length(scene)):
         m = Line(slaves()).start().rounds(1)
@@ -611,8 +613,8 @@ def test_slave_pulled_at_every_step(scene, unplugged_for):
 
 @pytest.mark.parametrize("how", ["offline", "power", "mode", "exchange"])
 def test_abort_at_every_step(how):
-    """FN-033: OFFLINE, power fail, a change of mode or a new activation in the middle: ABORTED, and nothing of the function
-    is sent afterwards; the next start finds the slave."""
+    """FN-033: OFFLINE, power fail, a change of mode or a new activation in the middle: ABORTED, and nothing of the
+    function is sent afterwards; the next start finds the slave."""
     scene = "a to b"
     slaves, old, new = SCENES[scene]
     for step in range(clean_length(scene) + 1):
@@ -672,8 +674,8 @@ def test_write_id1_that_fails():
     """FN-024: no slave 0, ID1 protected, not stored, not readable: each has its status."""
     m = Line([std(4)]).start()
     assert m.begin(WRITE_ID1, 0, 3) == NOT_DETECTED
-    for kw, status in (({"id1_protected": True}, BAD_ID1), ({"memory_fails": True}, ID1_TEMPORARY), ({"old": True}, NO_ID1),
-                       ({"write_us": NVM_US + 50_000}, ID1_TEMPORARY)):
+    for kw, status in (({"id1_protected": True}, BAD_ID1), ({"memory_fails": True}, ID1_TEMPORARY),
+                       ({"old": True}, NO_ID1), ({"write_us": NVM_US + 50_000}, ID1_TEMPORARY)):
         m = Line([std(0, id1=4, **kw), std(4)]).start()
         assert m.do(WRITE_ID1, value=1) == status, kw
         m.agree()
@@ -712,8 +714,8 @@ def replaced(kind=ab, at=37, fresh=None, others=(4,), more_projected=(), **kw):
 
 @pytest.mark.parametrize("kind, at", [(std, 9), (ab, 9), (ab, 37)])
 def test_automatic_addressing(kind, at):
-    """AD-008, AD-010, EX-019, LT-010: the new slave gets the missing address by itself and is active within 1.0 s, its memory
-    write of 100 ms included."""
+    """AD-008, AD-010, EX-019: the new slave gets the missing address by itself and is active within 1.0 s, its
+    memory write of 100 ms included."""
     m, new = replaced(kind, at)
     assert "auto_address_available" in m.read()["flags"] and "config_ok" not in m.read()["flags"]
     new.present = True
@@ -745,8 +747,8 @@ def test_automatic_addressing_compares_codes():
 
 @pytest.mark.parametrize("reason", ["two missing", "extra", "wrong", "configuration", "disabled", "overlap"])
 def test_automatic_addressing_keeps_away(reason):
-    """AD-009, EX-018: not with two missing slaves, an extra or wrong one, in configuration mode, without enable, or where a
-    wide slave (combined transaction 5) would take the address of another one."""
+    """AD-009, EX-018: not with two missing slaves, an extra or wrong one, in configuration mode, without enable, or
+    where a wide slave (combined transaction 5) would take the address of another one."""
     kw = {"two missing": {"more_projected": [std(20)]}, "disabled": {"auto": False}}.get(reason, {})
     m, new = replaced(std, 9, **kw)
     if reason == "extra":
@@ -795,8 +797,8 @@ def test_failed_automatic_addressing_waits():
 @pytest.mark.parametrize("step", range(7))
 @pytest.mark.parametrize("kind", ["deaf", "mute"])
 def test_automatic_addressing_with_failures(step, kind):
-    """AD-008, AD-009, AD-004: whichever call fails wholly, the slave ends where it is missing, at the second attempt at the
-    latest; its ID1 is never left changed in between."""
+    """AD-008, AD-009, AD-004: whichever call fails wholly, the slave ends where it is missing, at the second attempt at
+    the latest; its ID1 is never left changed in between."""
     m, new = replaced()
     m.fault = lambda k, call, attempt: kind if k == step else None
     new.present = True
@@ -826,8 +828,10 @@ def fake_strings():
     ffi = cffi.FFI()
     text = (ROOT / "firmware/tests/native.h").read_text()
     ffi.cdef(text.split("/* cffi begin */")[1].split("/* cffi end */")[0])
-    ffi.cdef("extern int fake_refuse; extern unsigned fake_kind; void fake_end(int status, unsigned length); int fake_open(void);")
-    return ffi, ffi.dlopen(str(compile_native(BUILD / "libasi_strings.so", sources, ["-fPIC", "-shared", "-O1", *SANITIZE])))
+    ffi.cdef("extern int fake_refuse; extern unsigned fake_kind;"
+             "void fake_end(int status, unsigned length); int fake_open(void);")
+    flags = ["-fPIC", "-shared", "-O1", *SANITIZE]
+    return ffi, ffi.dlopen(str(compile_native(BUILD / "libasi_strings.so", sources, flags)))
 
 
 def strings_line(library, **kw):
@@ -838,7 +842,7 @@ def strings_line(library, **kw):
 @pytest.mark.parametrize("function, parameter, kind", [(READ_STRING, 11, 2), (WRITE_STRING, 7, 3), (DIAGNOSIS, 13, 1),
                                                        (READ_ID, 14, 0)])
 def test_strings(fake_strings, function, parameter, kind):
-    """FN-027, FN-028, FN-029, FN-030, FN-032: the mode's parameter, the string, parameter F again; the bytes are there."""
+    """FN-027, FN-028, FN-029, FN-030, FN-032: the mode's parameter, the string, then parameter F; the bytes are there."""
     m = strings_line(fake_strings)
     data = bytes(range(100, 140)) if function == WRITE_STRING else b""
     del m.calls[:]
@@ -873,7 +877,7 @@ def test_message(fake_strings):
 
 
 def test_refusals_of_strings(fake_strings):
-    """FN-005, FN-027, FN-028, FN-031: not active, no such service, too long; parameters of such a slave are the master's."""
+    """FN-005, FN-027, FN-028, FN-031: not active, no such service, too long; its parameter is the master's."""
     m = strings_line(fake_strings, parameters={3: 4})
     assert m.slaves[0].parameter == 15 and m.begin(WRITE_PARAMETER, 3, 4) == PROFILE
     assert m.begin(READ_STRING, 20) == NOT_ACTIVE and m.begin(READ_STRING, 0) == ARG == m.begin(READ_STRING, 32)
@@ -897,7 +901,7 @@ def test_string_that_breaks(fake_strings, status):
 
 
 def test_string_refused_by_the_engine(fake_strings):
-    """FN-027: the parameter is F again, too, when the engine does not begin, or the slave did not answer its parameter."""
+    """FN-027: the parameter is F again when the engine refuses, or the slave did not answer its parameter."""
     m = strings_line(fake_strings)
     m.lib.fake_refuse = PROFILE
     assert m.do(READ_STRING, 3) == PROFILE and m.slaves[0].parameter == 15
