@@ -593,11 +593,11 @@ static asi_status_t check_change(const asi_ec_t *ec, unsigned from, unsigned to)
         return ASI_E_SLAVE0;
     if (asi_list_has(lds, to))
         return ASI_E_ADDRESS_USED;
-    if (to == 0u)
-        return ASI_OK;
-    if (twin != from && asi_list_has(lds, twin) && (!extended || (to > 31u && !ec_is_extended(ec, number))))
+    if ((ec->permanent.auto_clear & ASI_AUTO_CLEAR_MISSING) && asi_list_has(&ec->permanent.projection.lps, from))
+        return ASI_E_AUTO_CLEAR_MODE; /* it would be missing at once: OFFLINE in the middle of the way */
+    if (to != 0u && twin != from && asi_list_has(lds, twin) && (!extended || (to > 31u && !ec_is_extended(ec, number))))
         return ASI_E_ADDRESS_USED; /* a standard and an A/B slave on one number */
-    return overlaps(ec, ec->state.cdi[from], from, to) ? ASI_E_ADDRESS_USED : ASI_OK;
+    return to != 0u && overlaps(ec, ec->state.cdi[from], from, to) ? ASI_E_ADDRESS_USED : ASI_OK;
 }
 
 /** What is wrong with the arguments whatever the line does. */

@@ -15,8 +15,8 @@ from asi.telegram import decode_call, encode_call
 WRITE_PARAMETER, CHANGE, EXECUTE, WRITE_ID1, READ_STRING, WRITE_STRING, DIAGNOSIS, READ_ID, MESSAGE, AUTO = (
     5, 20, 22, 24, 27, 28, 29, 30, 31, 32)
 (ARG, STATE, BUSY, ABORT, SLAVE0, NOT_DETECTED, NOT_ACTIVE, USED, NO_ANSWER, DELETE, NO_ID1, BAD_ID1, ID1_TEMPORARY,
- SET_ADDRESS, ADDRESS_TEMPORARY, PROFILE, TOO_LONG, POWER, IS_OFFLINE, TRANSFER) = (
-    -1, -2, -3, -4, -6, -7, -8, -9, -10, -11, -12, -13, -14, -15, -16, -17, -18, -21, -22, -23)
+ SET_ADDRESS, ADDRESS_TEMPORARY, PROFILE, TOO_LONG, AUTO_CLEAR_MODE, POWER, IS_OFFLINE, TRANSFER) = (
+    -1, -2, -3, -4, -6, -7, -8, -9, -10, -11, -12, -13, -14, -15, -16, -17, -18, -20, -21, -22, -23)
 ADDRESSED = 10
 CYCLE_US, NVM_US, POLL_US, RESET_US = 5000, 500_000, 5000, 2000
 EVER = 10**6
@@ -472,6 +472,15 @@ def test_refusals_of_a_change():
     m.rounds(1)
     assert m.begin(CHANGE, 3, 10) == SLAVE0 == m.begin(CHANGE, 3, 0)
     assert m.begin(CHANGE, 0, 5) == USED and not m.calls and not m.events(ADDRESSED)
+
+
+def test_change_and_auto_clear():
+    """AD-001, EX-033: a projected slave would be missing at once and stop the line; others may move."""
+    m = Line([std(3), std(4)], projected=[std(3)], protected=True).start()
+    assert m.controls(auto_clear=1) == 0
+    assert m.begin(CHANGE, 3, 9) == AUTO_CLEAR_MODE == m.begin(CHANGE, 3, 0) and m.do(CHANGE, 4, 9) == 0
+    assert m.controls(auto_clear=2) == 0
+    assert m.do(CHANGE, 3, 10) == 0 and m.read()["phase"] == DATA_EXCHANGE
 
 
 def test_memory_that_does_not_last():
