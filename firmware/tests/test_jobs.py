@@ -851,7 +851,7 @@ def strings_line(library, **kw):
 @pytest.mark.parametrize("function, parameter, kind", [(READ_STRING, 11, 2), (WRITE_STRING, 7, 3), (DIAGNOSIS, 13, 1),
                                                        (READ_ID, 14, 0)])
 def test_strings(fake_strings, function, parameter, kind):
-    """FN-027, FN-028, FN-029, FN-030, FN-032: the mode's parameter, the string, then parameter F; the bytes are there."""
+    """FN-027, FN-028, FN-029, FN-030, FN-032: parameter of the mode, string, parameter F; the bytes are there."""
     m = strings_line(fake_strings)
     data = bytes(range(100, 140)) if function == WRITE_STRING else b""
     del m.calls[:]
