@@ -42,7 +42,7 @@ class Slave:
     write_us: int = 0          # its memory takes this long to write; S0 meanwhile
     memory_fails: bool = False  # what is written does not last: S3, and gone at the next power-up
     id1_protected: bool = False  # only bit 3 can be written
-    zero_sel: str = "0"        # select it obeys at address 0: "0", "1", "id1" (its bit 3), "both"
+    zero_select: str = "0"        # select it obeys at address 0: "0", "1", "id1" (its bit 3), "both"
     clock: object = staticmethod(lambda: 0)  # -> us
     writing_until: int | None = None
     memory_bad: bool = False   # S3
@@ -73,7 +73,7 @@ class Slave:
         if self.index:
             return bool(select) == bool(self.index >> 5)
         return {"0": select == 0, "1": select == 8, "both": True,
-                "id1": select == (self.id1 & 8 if self.extended else 0)}[self.zero_sel]
+                "id1": select == (self.id1 & 8 if self.extended else 0)}[self.zero_select]
 
     def store(self, index, id1):
         self.memory = self.memory or (self.index, self.id1)  # as it came

@@ -332,7 +332,7 @@ def test_execute_takes_the_legal_set_only():
 def test_execute_answers():
     """FN-022: the slave's answer is the data; A and B slaves through the code, address 0 with both selects; R1."""
     slaves = [std(3, io=5, id=2, id1=6, id2=9), ab(5, io=1, id1=3), ab(37, io=4, id1=11, fault=True),
-              ab(0, zero_sel="1", io=2)]
+              ab(0, zero_select="1", io=2)]
     m = Line(slaves).start()
     for number, info, data in ((3, 16, 5), (3, 17, 2), (3, 18, 6), (3, 19, 9), (5, 16, 1), (5, 24, 4), (5, 26, 11),
                                (5, 30, 0), (5, 22, 2), (5, 23, 2), (3, 31, 0), (0, 24, 2), (0, 13, 0)):
@@ -414,11 +414,11 @@ def test_change_of_a_standard_slave():
     m.agree()
 
 
-@pytest.mark.parametrize("zero_sel", ["0", "1", "id1", "both"])
+@pytest.mark.parametrize("zero_select", ["0", "1", "id1", "both"])
 @pytest.mark.parametrize("old, new", [(5, 37), (37, 5), (5, 6), (37, 38), (5, 60), (0, 5), (0, 37)])
-def test_change_of_an_ab_slave(old, new, zero_sel):
+def test_change_of_an_ab_slave(old, new, zero_select):
     """AD-003, AD-007: WID1 only where the select changes, bit 3 only; whatever select it obeys at address 0."""
-    m = Line([ab(old, id1=3 | (8 if old > 31 else 0), zero_sel=zero_sel, write_us=12_000), std(20)]).start().rounds(1)
+    m = Line([ab(old, id1=3 | (8 if old > 31 else 0), zero_select=zero_select, write_us=12_000), std(20)]).start().rounds(1)
     assert m.read()["lds"] == {old, 20}
     assert m.do(CHANGE, old, new) == 0
     s = m.slaves[0]
@@ -538,9 +538,9 @@ def test_change_without_data_exchange():
 
 SCENES = {
     "standard": (lambda: [std(3, id=1), std(4)], 3, 9),
-    "a to b": (lambda: [ab(5, id1=2, zero_sel="id1"), std(4)], 5, 41),
+    "a to b": (lambda: [ab(5, id1=2, zero_select="id1"), std(4)], 5, 41),
     "b to a": (lambda: [ab(41, id1=10), std(4)], 41, 41 - 32),
-    "zero": (lambda: [ab(0, id1=1, zero_sel="both"), std(4)], 0, 41),
+    "zero": (lambda: [ab(0, id1=1, zero_select="both"), std(4)], 0, 41),
     "to zero": (lambda: [std(3), std(4)], 3, 0),
 }
 
@@ -670,10 +670,10 @@ def test_write_id1():
     m.agree()
 
 
-@pytest.mark.parametrize("zero_sel", ["0", "1", "id1", "both"])
-def test_write_id1_of_an_ab_slave(zero_sel):
+@pytest.mark.parametrize("zero_select", ["0", "1", "id1", "both"])
+def test_write_id1_of_an_ab_slave(zero_select):
     """FN-024, AD-007: 0..7; bit 3 belongs to the address and stays."""
-    m = Line([ab(0, id1=12, zero_sel=zero_sel), std(4)]).start().rounds(1)
+    m = Line([ab(0, id1=12, zero_select=zero_select), std(4)]).start().rounds(1)
     assert m.begin(WRITE_ID1, 0, 8) == ARG and m.begin(WRITE_ID1, 0, 16) == ARG and m.begin(WRITE_ID1, 1, 2) == ARG
     assert m.do(WRITE_ID1, value=3) == 0 and m.slaves[0].id1 == 11
     m.agree()
@@ -694,10 +694,10 @@ def test_write_id1_that_fails():
 
 # ------------------------------------------------------------------------------------------ address 0 with both selects
 @pytest.mark.parametrize("others", [0, 1])
-@pytest.mark.parametrize("zero_sel", ["0", "1", "id1"])
-def test_zero_is_found_with_either_select(zero_sel, others):
+@pytest.mark.parametrize("zero_select", ["0", "1", "id1"])
+def test_zero_is_found_with_either_select(zero_select, others):
     """AD-007, EX-004, EX-017: detection and inclusion read address 0 with Sel = 0, then with Sel = 1."""
-    m = Line([ab(0, id1=9, zero_sel=zero_sel)] + [std(4)] * others).start()
+    m = Line([ab(0, id1=9, zero_select=zero_select)] + [std(4)] * others).start()
     assert 0 in m.read()["lds"] and m.read()["cdi"][0] == m.slaves[0].codes
     m.agree()
     if others:
@@ -713,7 +713,7 @@ def test_zero_is_found_with_either_select(zero_sel, others):
 def replaced(kind=ab, at=37, fresh=None, others=(4,), more_projected=(), **kw):
     """A line in protected mode whose slave at `at` is missing, and the new one at address 0, not yet plugged."""
     gone = kind(at, io=1, id2=3, **({"id1": 9} if kind is ab and at > 31 else {"id1": 1}))
-    new = fresh or kind(0, io=1, id2=3, id1=1, present=False, write_us=100_000, zero_sel="id1" if kind is ab else "0")
+    new = fresh or kind(0, io=1, id2=3, id1=1, present=False, write_us=100_000, zero_select="id1" if kind is ab else "0")
     new.present = False
     rest = [std(i) for i in others]
     m = Line([new, *rest], projected=[gone, *rest, *more_projected], protected=True, **{"auto": True, **kw}).start()
