@@ -418,7 +418,8 @@ def test_change_of_a_standard_slave():
 @pytest.mark.parametrize("old, new", [(5, 37), (37, 5), (5, 6), (37, 38), (5, 60), (0, 5), (0, 37)])
 def test_change_of_an_ab_slave(old, new, zero_select):
     """AD-003, AD-007: WID1 only where the select changes, bit 3 only; whatever select it obeys at address 0."""
-    m = Line([ab(old, id1=3 | (8 if old > 31 else 0), zero_select=zero_select, write_us=12_000), std(20)]).start().rounds(1)
+    moved = ab(old, id1=3 | (8 if old > 31 else 0), zero_select=zero_select, write_us=12_000)
+    m = Line([moved, std(20)]).start().rounds(1)
     assert m.read()["lds"] == {old, 20}
     assert m.do(CHANGE, old, new) == 0
     s = m.slaves[0]
@@ -713,7 +714,7 @@ def test_zero_is_found_with_either_select(zero_select, others):
 def replaced(kind=ab, at=37, fresh=None, others=(4,), more_projected=(), **kw):
     """A line in protected mode whose slave at `at` is missing, and the new one at address 0, not yet plugged."""
     gone = kind(at, io=1, id2=3, **({"id1": 9} if kind is ab and at > 31 else {"id1": 1}))
-    new = fresh or kind(0, io=1, id2=3, id1=1, present=False, write_us=100_000, zero_select="id1" if kind is ab else "0")
+    new = fresh or kind(0, io=1, id2=3, id1=1, write_us=100_000, zero_select="id1" if kind is ab else "0")
     new.present = False
     rest = [std(i) for i in others]
     m = Line([new, *rest], projected=[gone, *rest, *more_projected], protected=True, **{"auto": True, **kw}).start()
