@@ -17,7 +17,7 @@ typedef enum {
     ASI_CMD_RID2 = 0x13, /**< Read_Extended_ID-Code_2 */
     ASI_CMD_RES = 0x1C,  /**< Reset_Slave, answer 6 */
     ASI_CMD_RDST = 0x1E, /**< Read_Status */
-    ASI_CMD_R1 = 0x1F,   /**< Read_Reset_Status of specification 2.0: the status, which is cleared then; on demand only */
+    ASI_CMD_R1 = 0x1F,   /**< Read_Reset_Status of specification 2.0: status, then cleared; on demand only */
 } asi_command_t;
 
 /** Broadcast reset to all slaves; nobody answers. */

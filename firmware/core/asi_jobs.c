@@ -62,7 +62,8 @@ static bool memory_time_over(const asi_job_t *job) { return asi_port_time_us() -
 
 static void lists_changed(asi_ec_t *ec)
 {
-    ec_run_cycle(ec); /* LAS may have become empty, or not be empty any more */
+    if (!ec->reactivate)
+        ec_run_cycle(ec); /* LAS may have become empty, or not be empty any more */
     ec_update_flags(ec);
 }
 
@@ -269,7 +270,7 @@ static void look_done(asi_ec_t *ec, asi_job_t *job, bool good, unsigned data)
         astray(ec, job, ASI_E_SET_ADDRESS);
 }
 
-/** WPAR and DEXG, when the slave may be active and is not (EX-008, EX-009). Without success inclusion goes on trying. */
+/** WPAR and DEXG, when the slave may be active and is not (EX-008, EX-009). If they fail inclusion goes on trying. */
 static void activate(asi_ec_t *ec, asi_job_t *job)
 {
     if (asi_list_has(&ec->state.las, job->target) || !ec_may_activate(ec, job->target)) {
@@ -360,7 +361,8 @@ static void execute_done(asi_ec_t *ec, asi_job_t *job, bool good, unsigned data)
     }
     job->data = (uint8_t)data;
     job->outcome = good ? ASI_OK : ASI_E_NO_ANSWER;
-    if (good && data == ANSWER_RES && call == asi_call_command(ASI_CMD_RES, index) && asi_list_has(&ec->state.las, index)) {
+    if (good && data == ANSWER_RES && call == asi_call_command(ASI_CMD_RES, index) &&
+        asi_list_has(&ec->state.las, index)) {
         asi_list_t held = ASI_LIST_EMPTY;
         asi_list_add(&held, index);
         ec_inclusion_hold(ec, &held); /* the job activates it, nobody else */
@@ -380,7 +382,7 @@ static void string_end(asi_ec_t *ec, asi_job_t *job, asi_status_t status)
 {
     job->outcome = status;
     job->tries = 0;
-    if (job->kind == ASI_JOB_MESSAGE || !asi_list_has(&ec->state.las, job->index)) /* a new activation sets the parameter */
+    if (job->kind == ASI_JOB_MESSAGE || !asi_list_has(&ec->state.las, job->index)) /* activation sets the parameter */
         finish(ec, job, status);
     else
         go(job, STEP_STRING_END);
@@ -388,7 +390,8 @@ static void string_end(asi_ec_t *ec, asi_job_t *job, asi_status_t status)
 
 static asi_status_t string_open(asi_ec_t *ec, const asi_job_t *job)
 {
-    static const uint8_t kinds[] = {ASI_STRING_READ, ASI_STRING_WRITE, ASI_STRING_DIAGNOSIS, ASI_STRING_ID, ASI_STRING_MESSAGE};
+    static const uint8_t kinds[] = {ASI_STRING_READ, ASI_STRING_WRITE, ASI_STRING_DIAGNOSIS, ASI_STRING_ID,
+                                    ASI_STRING_MESSAGE};
     return asi_ctt_string(&ec->ctt, job->index, (asi_string_kind_t)kinds[job->kind - ASI_JOB_READ_PARAMETER_STRING],
                           job->length, asi_port_time_us());
 }
@@ -535,7 +538,8 @@ static void begin(asi_ec_t *ec, asi_job_t *job, asi_job_kind_t kind, unsigned in
     const uint8_t id1 = (uint8_t)(ec->state.cdi[index] >> 8 & 15u);
     asi_list_t held = ASI_LIST_EMPTY;
     *job = (asi_job_t){.kind = (uint8_t)kind, .index = (uint8_t)index, .value = (uint8_t)value, .status = ASI_E_BUSY,
-                       .codes = ec->state.cdi[index], .no_id2 = asi_list_has(&ec->no_id2, index), .id1 = id1, .id1_now = id1};
+                       .codes = ec->state.cdi[index], .no_id2 = asi_list_has(&ec->no_id2, index),
+                       .id1 = id1, .id1_now = id1};
     if (step == STEP_DELETE || step == STEP_FIND) {
         asi_list_add(&held, 0u);
         asi_list_add(&held, index);
@@ -589,15 +593,16 @@ static asi_status_t check_change(const asi_ec_t *ec, unsigned from, unsigned to)
         return ASI_E_SLAVE0;
     if (asi_list_has(lds, to))
         return ASI_E_ADDRESS_USED;
-    if (to == 0u)
-        return ASI_OK;
-    if (twin != from && asi_list_has(lds, twin) && (!extended || (to > 31u && !ec_is_extended(ec, number))))
+    if ((ec->permanent.auto_clear & ASI_AUTO_CLEAR_MISSING) && asi_list_has(&ec->permanent.projection.lps, from))
+        return ASI_E_AUTO_CLEAR_MODE; /* it would be missing at once: OFFLINE in the middle of the way */
+    if (to != 0u && twin != from && asi_list_has(lds, twin) && (!extended || (to > 31u && !ec_is_extended(ec, number))))
         return ASI_E_ADDRESS_USED; /* a standard and an A/B slave on one number */
-    return overlaps(ec, ec->state.cdi[from], from, to) ? ASI_E_ADDRESS_USED : ASI_OK;
+    return to != 0u && overlaps(ec, ec->state.cdi[from], from, to) ? ASI_E_ADDRESS_USED : ASI_OK;
 }
 
 /** What is wrong with the arguments whatever the line does. */
-static asi_status_t check_arguments(const asi_ec_t *ec, asi_job_kind_t kind, unsigned index, unsigned value, unsigned length)
+static asi_status_t check_arguments(const asi_ec_t *ec, asi_job_kind_t kind, unsigned index, unsigned value,
+                                    unsigned length)
 {
     bool good;
     switch (kind) {

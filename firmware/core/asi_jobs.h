@@ -17,7 +17,7 @@ typedef enum {
     ASI_JOB_WRITE_PARAMETER = 5,      /**< index, value: parameter. data: answer of the slave */
     ASI_JOB_CHANGE_ADDRESS = 20,      /**< index: old, value: new index */
     ASI_JOB_EXECUTE = 22,             /**< index: number 0..31, value: I4..I0. data: answer */
-    ASI_JOB_WRITE_ID1 = 24,           /**< value: new ID1 of the slave at address 0; 0..7 of an A/B slave. data: ID1 read back */
+    ASI_JOB_WRITE_ID1 = 24,           /**< value: new ID1 of the slave at address 0; 0..7 if A/B. data: as read */
     ASI_JOB_READ_PARAMETER_STRING = 27,
     ASI_JOB_WRITE_PARAMETER_STRING = 28,
     ASI_JOB_READ_DIAGNOSIS_STRING = 29,

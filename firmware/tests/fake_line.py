@@ -38,6 +38,15 @@ class Slave:
     parameter: int = 15
     disabled: bool = True      # data exchange, until WPAR
     heard: Counter = field(default_factory=Counter)
+    fault: bool = False        # S1
+    write_us: int = 0          # its memory takes this long to write; S0 meanwhile
+    memory_fails: bool = False  # what is written does not last: S3, and gone at the next power-up
+    id1_protected: bool = False  # only bit 3 can be written
+    zero_select: str = "0"        # select it obeys at address 0: "0", "1", "id1" (its bit 3), "both"
+    clock: object = staticmethod(lambda: 0)  # -> us
+    writing_until: int | None = None
+    memory_bad: bool = False   # S3
+    memory: tuple | None = None  # (index, id1) it starts with, once it was written
 
     @property
     def extended(self):
@@ -48,38 +57,85 @@ class Slave:
         ids = 0xFF00 if self.old else self.id2 << 12 | self.id1 << 8
         return ids | self.id << 4 | self.io
 
+    @property
+    def status(self):
+        writing = self.writing_until is not None and 0 < (self.writing_until - self.clock()) % 2**32 < 2**31
+        return writing | self.fault << 1 | self.memory_bad << 3
+
     def power_up(self):
-        self.outputs, self.parameter, self.disabled = 15, 15, True
+        """After RES, BR01 or with the supply: what is not in memory is forgotten."""
+        self.outputs, self.parameter, self.disabled, self.writing_until = 15, 15, True, None
+        if self.memory:
+            self.index, self.id1 = self.memory
+
+    def obeys(self, select):
+        """select: the select a call carries, 0 or 8."""
+        if self.index:
+            return bool(select) == bool(self.index >> 5)
+        return {"0": select == 0, "1": select == 8, "both": True,
+                "id1": select == (self.id1 & 8 if self.extended else 0)}[self.zero_select]
+
+    def store(self, index, id1):
+        self.memory = self.memory or (self.index, self.id1)  # as it came
+        self.writing_until, self.memory_bad = self.clock() + self.write_us, self.memory_fails
+        self.index, self.id1 = index, id1
+        if not self.memory_fails:
+            self.memory = index or self.memory[0], id1
+
+    def named(self, call):
+        """-> mnemonic of the call when this slave listens to it, else None."""
+        control, number, info = call >> 10, call >> 5 & 31, call & 31
+        if call == 0x7F5:
+            return "BR01"
+        if number != self.index & 31:
+            return None
+        if not control:
+            if self.index == 0:
+                return "ADRA"
+            if self.extended and bool(info & 8) == bool(self.index >> 5):
+                return None
+            return "WPAR" if info & 16 else "DEXG"
+        if self.index == 0 and info < 16:
+            return "WID1"
+        for select in (0, 8):
+            name = {**COMMANDS, 0x00: "DELA", 0x1F: "R1"}.get(info ^ select)
+            if name and self.obeys(select):
+                return name
+        return None
 
     def answer(self, call):
         """-> nibble or None. Acts like the call table."""
-        control, number, info = call >> 10, call >> 5 & 31, call & 31
-        sel = self.index >> 5
-        if not self.present or number != self.index & 31:
+        info = call & 31
+        name = self.named(call) if self.present else None
+        if name is None:
             return None
-        if not control:
-            if self.index == 0 or self.extended and bool(info & 8) == bool(sel):
-                return None
-            name = "WPAR" if info & 16 else "DEXG"
-        else:
-            select = 8 if sel else 0
-            name = COMMANDS.get(info ^ select)
-            if name is None:
-                return None
         self.heard[name] += 1
         if self.deaf:
             self.deaf -= 1
             return None
         if name in self.mute or self.old and name in ("RID1", "RID2") or name == "DEXG" and self.disabled:
             return None
+        if name == "WID1" and self.id1_protected and (info ^ self.id1) & 7:
+            return None
+        answer = {"DEXG": self.inputs, "WPAR": info & 15 if self.echo is None else self.echo, "RES": 6, "RDIO": self.io,
+                  "RDID": self.id, "RID1": self.id1, "RID2": self.id2, "RDST": self.status, "R1": self.status,
+                  "DELA": 0, "WID1": 0, "ADRA": 6, "BR01": None}[name]
         if name == "DEXG":
             self.outputs = info & (7 if self.extended else 15)
         elif name == "WPAR":
             self.parameter, self.disabled = info & (7 if self.extended else 15), False
-        elif name == "RES":
+        elif name in ("RES", "BR01"):
             self.power_up()
-        return {"DEXG": self.inputs, "WPAR": info & 15 if self.echo is None else self.echo, "RES": 6, "RDIO": self.io,
-                "RDID": self.id, "RID1": self.id1, "RID2": self.id2, "RDST": 0}[name]
+        elif name == "DELA":
+            self.memory = self.memory or (self.index, self.id1)
+            self.index = 0
+        elif name == "WID1":
+            self.store(self.index, info & 15)
+            if not self.memory_fails and self.memory[0]:  # a deleted address is still in memory, the select changes
+                self.memory = (self.memory[0] & 31 | (self.id1 & 8) << 2 if self.extended else self.memory[0], self.id1)
+        elif name == "ADRA" and info:
+            self.store(info + (32 if self.extended and self.id1 & 8 else 0), self.id1)
+        return answer
 
 
 def projection(slaves=(), parameters=None):

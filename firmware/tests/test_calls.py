@@ -64,7 +64,8 @@ def test_legal_calls():
     legal = {encode_call(n, i, d, e) for n in ("DEXG", "WPAR") for i in INDICES for d in range(16) for e in (0, 1)}
     legal |= {encode_call("ADRA", data=d) for d in range(32)} | {encode_call("WID1", data=d) for d in range(1, 16)}
     legal |= {encode_call(n, i) for n in COMMANDS for i in INDICES} | {encode_call("BR01")}
-    legal |= {encode_call(n, i) for n in COMMANDS if n != "DELA" for i in (0, 32)}
+    legal |= {encode_call(n, i) for n in COMMANDS if n != "DELA" for i in (0, 32)} | {encode_call("WID1", data=0)}
+    legal |= {encode_call("R1", i) ^ select for i in range(32) for select in (0, 8)}
     lib = load()[1]
     assert {c for c in range(4096) if lib.fw_call_is_legal(c)} == legal
     assert not lib.fw_call_is_legal(encode_call("PRGM")) and decode_call(encode_call("PRGM")).name == "PRGM"

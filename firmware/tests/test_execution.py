@@ -436,7 +436,7 @@ def test_auto_address_flags():
     m.protect()
     m.until(lambda s: s["phase"] == DATA_EXCHANGE)
     assert flags() == {"auto_address_assign", "auto_address_available"}
-    m.slaves.append(std(0))  # the slave to be addressed does not disturb
+    m.slaves.append(std(0, io=1))  # a slave 0 does not disturb; this one is not the missing one
     m.rounds()
     assert flags() == {"auto_address_assign", "auto_address_available"} and "lds0" in m.read()["flags"]
     m.project([one, two])
