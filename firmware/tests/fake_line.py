@@ -185,7 +185,7 @@ class Master:
             error, data = self.attempt(call, index)
             return data, ABORTED if error == ABORTED else OK, tag
         for s in self.slaves:  # ST-001: the books are kept for the slave that answers
-            if s.index and s.index & 31 == call >> 5 & 31 and request.sel != s.index >> 5:
+            if (s.extended or call >> 10) and s.index and s.index & 31 == call >> 5 & 31 and request.sel != s.index >> 5:
                 assert replace(s, heard=Counter()).answer(call) is None, (hex(call), s.index)
         for _ in range(request.retries + 1):
             error, data = self.attempt(call, index)
