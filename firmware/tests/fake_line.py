@@ -184,9 +184,10 @@ class Master:
         if request.no_reply:
             error, data = self.attempt(call, index)
             return data, ABORTED if error == ABORTED else OK, tag
-        for s in self.slaves:  # ST-001: the books are kept for the slave that answers
-            if (s.extended or call >> 10) and s.index and s.index & 31 == call >> 5 & 31 and request.sel != s.index >> 5:
-                assert replace(s, heard=Counter()).answer(call) is None, (hex(call), s.index)
+        if call >> 10 and call >> 5 & 31:  # ST-001: the books are kept for the slave that answers
+            for s in self.slaves:
+                if s.index & 31 == call >> 5 & 31 and request.sel != s.index >> 5:
+                    assert replace(s, heard=Counter()).answer(call) is None, (hex(call), s.index)
         for _ in range(request.retries + 1):
             error, data = self.attempt(call, index)
             if error in (OK, ABORTED):
