@@ -38,3 +38,9 @@ firmware-coverage: $(VENV)/.ready  ## native firmware tests with line and branch
 	@rm -rf $(FW)/native
 	@FW_COVERAGE=1 $(VPY) -m pytest firmware/tests -k 'not image'
 	@cd $(FW)/native && gcov -b -n *.gcda | grep -A3 "File.*firmware/core"
+
+CYCLES ?= 1000000
+SEEDS  ?= 1 2 3 4
+.PHONY: soak
+soak: $(VENV)/.ready  ## core against its reference for CYCLES=1000000 random cycles, SEEDS='1 2 3 4' in parallel (minutes)
+	@$(VPY) firmware/tests/soak.py --cycles $(CYCLES) --seeds $(SEEDS)
