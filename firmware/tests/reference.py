@@ -28,6 +28,7 @@ class Reference:
         self.lps, self.pcd, self.pp = set(lps), list(pcd), list(pp)
         self.protected, self.exchange = bool(protected_mode), bool(data_exchange)
         self.auto_address, self.auto_clear = bool(auto_address), auto_clear
+        self.zero_sel = False  # the select that a slave at address 0 answers
         self.offline = self.apf = self.cleared = self.ready = self.again = self.reading = False
         self.power_up, self.settle = True, SETTLE_US
         self.phase = OFFLINE
@@ -122,9 +123,9 @@ class Reference:
     def detect(self):
         """EX-004 .. EX-007"""
         while not self.lds:
-            who = list(range(32))
+            who, self.zero_sel = list(range(32)), False
             for sel in (0, 32):
-                silent = set(range(1, 32)) if not sel else set()
+                silent = set(range(32)) if not sel else set()
                 extended = set()
                 io, ident = {}, {}
                 if who:
@@ -139,7 +140,8 @@ class Reference:
                     answers = yield [encode_call(name, i) for i in ident for name in ("RID1", "RID2")]
                     for i, id1, id2 in zip(ident, answers[::2], answers[1::2]):
                         if ident[i] != 0xA or None not in (id1, id2):
-                            self.enter_lds(i, codes_of(io[i], ident[i], id1, id2), id2 is not None)
+                            self.zero_sel = self.zero_sel or i == 32  # AD-007: address 0 with Sel = 1
+                            self.enter_lds(0 if i == 32 else i, codes_of(io[i], ident[i], id1, id2), id2 is not None)
                 who = sorted(32 + n for n in silent | extended)
 
     def activate(self, who):
@@ -164,7 +166,7 @@ class Reference:
         self.probes += 1
 
     def include(self):
-        """EX-010, EX-012, EX-013, EX-014, EX-017"""
+        """EX-010, EX-012, EX-013, EX-014, EX-017, AD-007"""
         def attempts(make):
             for _ in range(ATTEMPTS):
                 answer = yield make()
@@ -173,20 +175,26 @@ class Reference:
             return None
 
         def codes_from(i):
-            ident = yield from attempts(lambda: encode_call("RDID", i))
+            at = 32 if i == 0 and self.zero_sel else i
+            ident = yield from attempts(lambda: encode_call("RDID", at))
             if ident is None:
                 return None
-            id1 = yield from attempts(lambda: encode_call("RID1", i))
+            id1 = yield from attempts(lambda: encode_call("RID1", at))
             if id1 is None and ident == 0xA:
                 return None
-            id2 = yield from attempts(lambda: encode_call("RID2", i))
+            id2 = yield from attempts(lambda: encode_call("RID2", at))
             return None if id2 is None and ident == 0xA else (ident, id1, id2)
 
         i = 63
         while True:
             self.reading = False
             i = next(k % 64 for k in range(i + 1, i + 65) if k % 64 in SLAVES - self.las | {0})
-            io = yield encode_call("RDIO", i)
+            if i == 0:  # AD-007
+                self.zero_sel = self.zero_sel and 0 in self.lds
+            io = yield encode_call("RDIO", 32 if i == 0 and self.zero_sel else i)
+            if i == 0 and io is None:
+                self.zero_sel = not self.zero_sel
+                io = yield encode_call("RDIO", 32 if self.zero_sel else 0)
             codes = None
             if io is not None:
                 self.reading = True

@@ -49,6 +49,8 @@ class World:
     # ---- the plant
     def appears(self):
         s = self.slave(self.dice.choice(self.indices))
+        if s.index == 0 and self.m.controls()["auto_address"]:
+            return  # automatic addressing is not part of the reference
         if self.dice.random() < 0.9:  # else a second one with this address
             self.m.slaves = [x for x in self.m.slaves if x.index != s.index]
         self.m.slaves.append(s)
@@ -90,6 +92,8 @@ class World:
         value = self.dice.randrange(5) if name == "auto_clear" else self.dice.random() < (0.2 if name == "offline" else 0.5)
         if name == "data_exchange" and value and self.compare.r.reading:
             return  # known: an inclusion that is under way stops the new activation
+        if name == "auto_address" and value and any(s.index == 0 for s in self.m.slaves):
+            return
         self.m.control(**{name: value})
 
     def project(self):

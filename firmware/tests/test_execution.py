@@ -281,12 +281,13 @@ def test_normal_operation_flag():
 
 
 def test_probe_order():
-    """EX-012: one probe a cycle, to every address not in LAS, 0 included, Sel = 0 then Sel = 1, wrapping; never 32."""
+    """EX-012, AD-007: one probe a cycle, to every address not in LAS, all with Sel = 0, then with Sel = 1, wrapping;
+    address 0 with both."""
     m = Master([std(1), ab(5), ab(37)]).start()
     start = len(m.log)
-    m.probes(2 * 60)
+    m.probes(2 * 61)
     probes = [i for n, i in m.names(start) if n == "RDIO"]
-    candidates = [i for i in range(64) if i not in (1, 5, 37, 32)]
+    candidates = [0, 32, *(i for i in range(1, 64) if i not in (1, 5, 37, 32))]
     assert probes == candidates * 2
     cycles = m.cycle_number
     assert len(m.log) - start == cycles * 3  # 1, 5 and 5B in turns, and one extra call
@@ -351,7 +352,7 @@ def test_inclusion_retries(name):
 def test_inclusion_gives_up():
     """EX-010, EX-013: after the third failure the search goes on; an A/B slave without RID1 is not taken."""
     m = Master([std(1), ab(9, mute=frozenset({"RID1"}))]).start()
-    m.probes(62 + 4)  # one round, and RDID and three times RID1
+    m.probes(63 + 4)  # one round, and RDID and three times RID1
     assert m.read()["lds"] == {1} and m.slaves[1].heard["RID1"] == 6  # three in detection, three in the round
 
 
@@ -362,9 +363,9 @@ def test_missed_rounds():
     while [n for n in m.names()[-2:] if n == ("RID2", 0)] == []:
         m.cycles(1)
     m.slaves[1].present = False
-    m.probes(2 * 62)
+    m.probes(2 * 63)
     assert m.read()["lds"] == {0, 1} and "lds0" in m.read()["flags"]
-    m.probes(62)
+    m.probes(63)
     assert m.read()["lds"] == {1} and "lds0" not in m.read()["flags"] and m.read()["cdi"][0] == 0xFFFF
 
 
@@ -373,10 +374,10 @@ def test_miss_counter_starts_over():
     m = Master([std(1), std(0)]).start()
     for _ in range(4):
         m.slaves[1].present = False
-        m.probes(2 * 62)
+        m.probes(2 * 63)
         assert m.read()["lds"] == {0, 1}
         m.slaves[1].present = True
-        m.probes(62 + 3)
+        m.probes(63 + 3)
         assert m.read()["lds"] == {0, 1}
 
 
