@@ -55,5 +55,5 @@ fuzz:  ## coverage-guided fuzzing of the core for FUZZ_TIME=60 s (needs clang wi
 	@mkdir -p $(FW)/fuzz/corpus $(FW)/fuzz/found
 	@$(FUZZ_CC) -std=c17 -g -O1 -DFUZZ_LIBFUZZER -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
 	  -Ifirmware/core -Ifirmware/generated $(FUZZ_SRC) -o $(FW)/fuzz/fuzz
-	@cd $(FW)/fuzz && ./fuzz -max_total_time=$(FUZZ_TIME) -max_len=600 -print_final_stats=1 -artifact_prefix=found/ \
+	@cd $(FW)/fuzz && ./fuzz -max_total_time=$(FUZZ_TIME) -max_len=600 -len_control=0 -print_final_stats=1 -artifact_prefix=found/ \
 	  corpus $(CURDIR)/firmware/tests/corpus

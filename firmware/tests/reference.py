@@ -329,7 +329,7 @@ class Reference:
         return 0
 
     def permanent_changed(self):
-        """EX-009"""
+        """EX-009. In the activation phase the core does not look (test_projection_change_between_activation_batches)."""
         if self.protected and self.phase == DATA_EXCHANGE:
             for i in [i for i in self.las if not self.allowed(i)]:
                 self.leave_las(i)

@@ -41,7 +41,8 @@ class World:
         extended = index > 32 or self.dice.random() < 0.4
         return PeripheralSlave(index, io=self.dice.choice(IO), id=EXTENDED_ID if extended else self.dice.choice(STANDARD_ID),
                                id1=self.dice.randrange(16), id2=self.dice.randrange(16), inputs=self.dice.randrange(1, 16),
-                               old=not extended and self.dice.random() < 0.2)
+                               old=not extended and self.dice.random() < 0.2,
+                               zero_sel=extended and self.dice.random() < 0.5)
 
     def some(self):
         return self.dice.choice(self.m.slaves) if self.m.slaves else self.slave(0)

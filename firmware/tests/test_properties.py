@@ -20,6 +20,7 @@ def slaves(draw):
     return PeripheralSlave(index, io=draw(st.sampled_from(IO)), id1=draw(nibbles), id2=draw(nibbles),
                            id=EXTENDED_ID if extended else draw(st.sampled_from(STANDARD_ID)),
                            inputs=draw(st.integers(1, 15)), fault=draw(st.booleans()),
+                           zero_sel=extended and draw(st.booleans()),
                            old=not extended and draw(st.booleans()))  # EX-005: an A/B slave has RID1 and RID2
 
 
