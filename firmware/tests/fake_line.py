@@ -170,10 +170,13 @@ def words_of(nibbles):
 
 @dataclass
 class PeripheralSlave(Slave):
-    """A slave that reports a peripheral fault: S1 of its status."""
+    """A slave that reports a peripheral fault: S1 of its status. At address 0 it may obey Sel = 1 (AD-007)."""
     fault: bool = False
+    zero_sel: bool = False
 
     def answer(self, call):
+        if self.index == 0 and self.zero_sel and call >> 10:
+            call ^= 8
         data = super().answer(call)
         return data if data is None or name_of(call)[0] != "RDST" else data & ~2 | 2 * self.fault
 
@@ -240,9 +243,10 @@ class Master:
         if request.no_reply:
             error, data = self.attempt(call, index)
             return data, ABORTED if error == ABORTED else OK, tag
-        for s in self.slaves:  # ST-001: the books are kept for the slave that answers
-            if s.index and s.index & 31 == call >> 5 & 31 and request.sel != s.index >> 5:
-                assert replace(s, heard=Counter()).answer(call) is None, (hex(call), s.index)
+        if call >> 10 and call >> 5 & 31:  # ST-001: the books are kept for the slave that answers
+            for s in self.slaves:
+                if s.index & 31 == call >> 5 & 31 and request.sel != s.index >> 5:
+                    assert replace(s, heard=Counter()).answer(call) is None, (hex(call), s.index)
         for _ in range(request.retries + 1):
             error, data = self.attempt(call, index)
             if error in (OK, ABORTED):

@@ -281,12 +281,13 @@ def test_normal_operation_flag():
 
 
 def test_probe_order():
-    """EX-012: one probe a cycle, to every address not in LAS, 0 included, Sel = 0 then Sel = 1, wrapping; never 32."""
+    """EX-012, AD-007: one probe a cycle, to every address not in LAS, all with Sel = 0, then with Sel = 1, wrapping;
+    address 0 with both."""
     m = Master([std(1), ab(5), ab(37)]).start()
     start = len(m.log)
-    m.probes(2 * 60)
+    m.probes(2 * 61)
     probes = [i for n, i in m.names(start) if n == "RDIO"]
-    candidates = [i for i in range(64) if i not in (1, 5, 37, 32)]
+    candidates = [0, 32, *(i for i in range(1, 64) if i not in (1, 5, 37, 32))]
     assert probes == candidates * 2
     cycles = m.cycle_number
     assert len(m.log) - start == cycles * 3  # 1, 5 and 5B in turns, and one extra call
@@ -351,7 +352,7 @@ def test_inclusion_retries(name):
 def test_inclusion_gives_up():
     """EX-010, EX-013: after the third failure the search goes on; an A/B slave without RID1 is not taken."""
     m = Master([std(1), ab(9, mute=frozenset({"RID1"}))]).start()
-    m.probes(62 + 4)  # one round, and RDID and three times RID1
+    m.probes(63 + 4)  # one round, and RDID and three times RID1
     assert m.read()["lds"] == {1} and m.slaves[1].heard["RID1"] == 6  # three in detection, three in the round
 
 
@@ -362,9 +363,9 @@ def test_missed_rounds():
     while [n for n in m.names()[-2:] if n == ("RID2", 0)] == []:
         m.cycles(1)
     m.slaves[1].present = False
-    m.probes(2 * 62)
+    m.probes(2 * 63)
     assert m.read()["lds"] == {0, 1} and "lds0" in m.read()["flags"]
-    m.probes(62)
+    m.probes(63)
     assert m.read()["lds"] == {1} and "lds0" not in m.read()["flags"] and m.read()["cdi"][0] == 0xFFFF
 
 
@@ -373,10 +374,10 @@ def test_miss_counter_starts_over():
     m = Master([std(1), std(0)]).start()
     for _ in range(4):
         m.slaves[1].present = False
-        m.probes(2 * 62)
+        m.probes(2 * 63)
         assert m.read()["lds"] == {0, 1}
         m.slaves[1].present = True
-        m.probes(62 + 3)
+        m.probes(63 + 3)
         assert m.read()["lds"] == {0, 1}
 
 
@@ -840,3 +841,87 @@ def test_suspected_duplicates():
         m.lib.fw_quality(4, 16, 0, 0)
     assert not m.read()["suspects"]
     assert [e[1:] for e in m.events()[1] if e[1] == 12] == [(12, 4, 1), (12, 4, 0)] * 2
+
+
+# ------------------------------------------------------------------------------------------ the projection changes meanwhile
+@pytest.mark.parametrize("calls", [3, 4])
+def test_projection_change_during_inclusion(calls):
+    """EX-009, EX-013: a slave that the host takes out of its project between WPAR and DEXG is not activated."""
+    one, nine = std(1), std(9, present=False)
+    m = Master([one, nine], projected=[one, nine], protected_mode=True).start()
+    nine.present = True
+    while m.slaves[1].heard["RDIO"] == 0:
+        m.cycles(1)
+    m.probes(calls)
+    m.project([one])
+    m.probes(20)
+    assert m.read()["las"] == {1} and m.read()["lds"] == {1, 9} and nine.heard["DEXG"] == calls - 3
+
+
+def test_projection_change_during_activation():
+    """EX-009: the same in the activation phase, for slaves of the batch under way."""
+    slaves = [std(1), std(2)]
+    m = Master(slaves, projected=slaves, protected_mode=True)
+    m.settle()
+    m.until(lambda s: s["phase"] == ACTIVATION)
+    m.project(slaves[:1])
+    m.until(lambda s: s["phase"] == DATA_EXCHANGE)
+    assert m.read()["las"] == {1}
+
+
+@pytest.mark.xfail(strict=True, reason="asi_ec.c does not look again at those that are already in LAS")
+def test_projection_change_between_activation_batches():
+    """EX-009: and for those of an earlier batch."""
+    slaves = full_network()
+    m = Master(slaves, projected=slaves, protected_mode=True)
+    m.settle()
+    m.until(lambda s: s["phase"] == ACTIVATION)
+    m.batch()
+    assert len(m.read()["las"]) == 32
+    m.project(slaves[40:])
+    m.until(lambda s: s["phase"] == DATA_EXCHANGE)
+    assert m.read()["las"] == {s.index for s in slaves[40:]}
+
+
+# ------------------------------------------------------------------------------------------ with combined transactions
+def test_multiplexed_slave():
+    """CT-030, LK-018: S-7.A.7: its slot is live and carries outputs 3, 2 and 1, 0 in turns; the cycle is not too short."""
+    m = Master([ab(5, io=7, id2=7)])
+    m.host_outputs[5] = 0b1001
+    m.start().cycles(8)
+    assert m.port.live[5] and m.port.min_cycle_us == 1000
+    start = len(m.log)
+    m.cycles(6)
+    nibbles = [c & 15 for c, _, _ in m.log[start:] if c < 0x400]
+    assert nibbles in ([0b1101, 0b1010] * 3, [0b1010, 0b1101] * 3)
+    m.slaves[0].present = False
+    m.until(lambda s: not s["las"])
+    m.slaves[0] = ab(5)  # a plain slave comes back in its place
+    m.until(lambda s: s["las"])
+    assert not m.port.live[5] and m.port.min_cycle_us == 0
+
+
+def test_safety_slave():
+    """CT-060: words pass as they are; a failed call gives 0000 in that cycle, other slaves keep their last value."""
+    m = Master([std(2, inputs=5), std(9, io=0, id=0xB, inputs=0b1011)]).start().cycles(3)
+    assert m.read()["in"][9] == 0b1011
+    m.slaves[0].deaf = m.slaves[1].deaf = 2
+    m.cycles(1)
+    assert m.read()["in"][9] == 0 and m.read()["in"][2] == 5
+    m.cycles(1)
+    assert m.read()["in"][9] == 0b1011
+
+
+def test_incomplete_group():
+    """CT-052, EX-016: a member of a CTT5 group without the other one is a configuration error."""
+    slaves = [std(5, io=6, id=0, id2=0xA), std(6, io=6, id=0, id2=5)]
+    m = Master(slaves, projected=slaves, protected_mode=True).start().cycles(2)
+    assert "config_ok" in m.read()["flags"]
+    m = Master(slaves[:1], projected=slaves[:1]).start().cycles(2)
+    assert m.read()["las"] == {5} and "config_ok" not in m.read()["flags"]
+
+
+def test_master_owns_the_parameter():
+    """FN-005, EX-008: a slave with strings (S-7.4) is activated with parameter F whatever PI says."""
+    m = Master([std(3, io=7, id=4, id2=0xC), std(4)], parameters={3: 5, 4: 5}).start()
+    assert [s.parameter for s in m.slaves] == [15, 5]

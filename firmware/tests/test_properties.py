@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever slaves, line, power and host do in whatever order: what must hold after every batch, cycle and tick."""
-from fake_line import DATA_EXCHANGE, OFFLINE, Master, Slave
+"""Whatever slaves, line, power and host do in whatever order: after every batch, cycle and tick the core is as the
+reference (reference.py) says, and what must always hold does."""
+from fake_line import DATA_EXCHANGE, OFFLINE, Master, PeripheralSlave
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from reference import Compare
+from soak import EXTENDED_ID, IO, STANDARD_ID
 
 nibbles = st.integers(0, 15)
 numbers = st.integers(1, 4)  # few numbers, so that pairs, clashes and re-use happen
@@ -14,18 +17,20 @@ indices = st.sampled_from([0, 1, 2, 3, 31, 33, 34, 63])
 def slaves(draw):
     index = draw(indices)
     extended = index > 32 or draw(st.booleans())
-    return Slave(index, io=draw(nibbles), id=0xA if extended else draw(st.sampled_from([0, 1, 0xB, 0xF])),
-                 id1=draw(nibbles), id2=draw(nibbles), inputs=draw(st.integers(1, 15)),
-                 old=not extended and draw(st.booleans()))  # EX-005: an A/B slave has RID1 and RID2
+    return PeripheralSlave(index, io=draw(st.sampled_from(IO)), id1=draw(nibbles), id2=draw(nibbles),
+                           id=EXTENDED_ID if extended else draw(st.sampled_from(STANDARD_ID)),
+                           inputs=draw(st.integers(1, 15)), fault=draw(st.booleans()),
+                           zero_sel=extended and draw(st.booleans()),
+                           old=not extended and draw(st.booleans()))  # EX-005: an A/B slave has RID1 and RID2
 
 
 class Line(RuleBasedStateMachine):
-    """EX-001, EX-008, EX-009, EX-015 .. EX-021, EX-023, EX-025, EX-026, CA-003, CA-006: what always holds."""
+    """EX-001 .. EX-024, EX-025 .. EX-029, EX-032, EX-033, EX-035 .. EX-038, CA-003, CA-006: what always holds."""
 
-    @initialize(first=st.lists(slaves(), max_size=4, unique_by=lambda s: s.index))
-    def power_up(self, first):
-        self.m = Master(first)
-        self.m.check = self.check
+    @initialize(first=st.lists(slaves(), max_size=4, unique_by=lambda s: s.index), real=st.booleans())
+    def power_up(self, first, real):
+        self.m = Master(first, projected=[s for s in first if s.index] if real else [])
+        self.compare = Compare(self.m)
         self.checked = 0
         self.version, self.shown = None, None
         self.m.settle()
@@ -35,6 +40,8 @@ class Line(RuleBasedStateMachine):
 
     @rule(s=slaves())
     def appears(self, s):
+        if s.index == 0 and self.m.controls()["auto_address"]:
+            return
         if old := self.find(s.index):
             self.m.slaves.remove(old)
         self.m.slaves.append(s)
@@ -63,41 +70,44 @@ class Line(RuleBasedStateMachine):
     def noise(self, level):
         self.m.noise = level
 
+    @rule(index=indices)
+    def periphery(self, index):
+        if s := self.find(index):
+            s.fault = not s.fault
+
     @rule(apf=st.booleans())
     def power(self, apf):
         self.m.power(apf)
 
-    @rule(on=st.booleans())
-    def protect(self, on):
-        self.m.protect(on)
-
-    @rule(on=st.booleans())
-    def offline(self, on):
-        self.m.set_offline(on)
-
-    @rule(on=st.booleans())
-    def data_exchange(self, on):
-        self.m.set_data_exchange(on)
-
-    @rule(on=st.booleans())
-    def auto_address(self, on):
-        self.m.set_auto_address(on)
+    @rule(change=st.one_of(
+        st.tuples(st.sampled_from(["protected_mode", "offline", "data_exchange", "auto_address"]), st.booleans()),
+        st.tuples(st.just("auto_clear"), st.integers(0, 4))))
+    def control(self, change):
+        known = change == ("data_exchange", True) and self.compare.r.reading  # see test_functions.py
+        addressing = change == ("auto_address", True) and self.find(0)  # not part of the reference
+        if not known and not addressing:
+            self.m.control(**dict([change]))
 
     @rule(some=st.lists(slaves().filter(lambda s: s.index), max_size=3, unique_by=lambda s: s.index),
           real=st.booleans())
     def project(self, some, real):
         self.m.project([s for s in self.m.slaves if s.index] if real else some)
 
+    @rule(call=st.one_of(
+        st.tuples(st.just("set_pp"), indices, st.integers(0, 16)),
+        st.tuples(st.just("set_pcd"), indices, st.integers(0, 0x10000)),
+        st.tuples(st.just("set_lps"), st.sets(indices)), st.just(("store_configuration",)),
+        st.just(("store_parameters",))))
+    def function(self, call):
+        self.compare.function(*call)
+
     @rule(outputs=st.lists(nibbles, min_size=64, max_size=64))
     def outputs(self, outputs):
         self.m.host_outputs = outputs
 
-    @rule(index=indices)
-    def management(self, index):
-        self.m.lib.fw_manage(0x400 | (index & 31) << 5 | 0x1E ^ (8 if index > 31 else 0))
-
-    @rule(steps=st.integers(1, 90), late=st.booleans())
-    def runs(self, steps, late):
+    @rule(steps=st.integers(1, 90), late=st.booleans(), delay=st.integers(0, 3))
+    def runs(self, steps, late, delay):
+        self.m.delay = delay
         for _ in range(steps):
             if late:
                 self.m.cycle(report=False)
@@ -110,7 +120,7 @@ class Line(RuleBasedStateMachine):
 
     def check(self):
         m, s = self.m, self.m.read()
-        lps = {i for i in range(64) if m.projected[0][i >> 5] >> (i & 31) & 1}
+        lps, pcd, _, controls = m.permanent()
         assert m.port.violations == 0
         assert s["las"] <= s["lds"] and 0 not in s["las"] and not s["lds"] & {32}
         assert {i for i in range(64) if m.port.active[i]} == s["las"]
@@ -118,18 +128,15 @@ class Line(RuleBasedStateMachine):
         assert all(s["cdi"][i] == 0xFFFF for i in range(64) if i not in s["lds"])
         assert all(s["in"][i] == 0 for i in range(64) if i not in s["las"])
         assert s["flags"] == m.expected_flags(s), s
-        if m.protected:
-            assert all(i in lps and s["cdi"][i] == m.projected[1][i] for i in s["las"])
+        if controls["protected_mode"]:
+            assert all(i in lps and s["cdi"][i] == pcd[i] for i in s["las"])
         for i in s["las"]:  # EX-026
             assert i < 33 or i - 32 not in s["lds"] or s["cdi"][i - 32] >> 4 & 15 == 0xA
         if s["phase"] == OFFLINE:
             assert not s["lds"] and list(m.port.out) == [0xFFFFFFFF] * 8 and not m.port.line
-        if m.apf or m.offline:
+        if m.apf or controls["offline"]:
             assert s["phase"] == OFFLINE
-        assert ("normal_operation_active" in s["flags"]) == bool(m.port.cycle) == (s["phase"] == DATA_EXCHANGE)
-        for i in range(64):  # idle addresses, and all with data exchange off: F
-            if i not in s["las"] or not m.data_exchange:
-                assert m.port.out[i >> 3] >> 4 * (i & 7) & 15 == 15
+        assert ("normal_operation_active" in s["flags"]) == (s["phase"] == DATA_EXCHANGE)
         for call, _, _ in m.log[self.checked:]:
             assert m.lib.fw_call_is_legal(call) and (call >= 0x400 or call >> 5), hex(call)
         self.checked = len(m.log)
@@ -150,8 +157,9 @@ class Line(RuleBasedStateMachine):
         for s in m.slaves:
             s.mute, s.present = frozenset(), True
         m.power(False)
-        m.set_offline(False)
-        m.protect(False)
+        assert m.control(offline=False, auto_clear=0, protected_mode=False) == 0
+        for _ in range(8):  # a new activation that is under way
+            m.step()
         standard = {s.index for s in m.slaves if s.index < 32 and not s.extended}
         m.slaves = [s for s in m.slaves if s.index - 32 not in standard]
         if m.slaves:
