@@ -684,7 +684,8 @@ class _Builder:
         """What a slave has beside inputs and values, as arguments of Slave."""
         kind, out = codes.kind, {}
         if table.values is not None and (kind.group or not kind.inputs):
-            raise _Fault("values", f"{codes.profile} has no 16-bit inputs{kind.group * ': give each member its inputs'}")
+            hint = ": give each member its inputs" if kind.group else ""
+            raise _Fault("values", f"{codes.profile} has no 16-bit inputs{hint}")
         if table.values is not None and len(table.values) > kind.inputs:
             raise _Fault("values", f"{len(table.values)} channels, {codes.profile} has {kind.inputs}")
         for key in ("invalid", "overflow"):
