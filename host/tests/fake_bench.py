@@ -180,7 +180,7 @@ class FakeBench:
         new = next((s for s in present if s.index == 0), None)
         missing = self._projected().keys() - {s.index for s in present}
         wrong = [s for s in present if s.index and self._projected().get(s.index) != s.codes.word]
-        if new and len(missing) == 1 and not wrong and self._get(regmap.HOST_HOST_CTRL) & 9 == 9 \
+        if new and len(missing) == 1 and not missing & self.seen[1] and not wrong and self._get(regmap.HOST_HOST_CTRL) & 9 == 9 \
                 and self._projected()[min(missing)] == new.codes.word:
             new.index, = missing
             self._event(LogEvent.ADDRESSED, new.index)
@@ -201,6 +201,8 @@ class FakeBench:
                 valid = not (slave.invalid | slave.overflow) >> channel & 1
                 aidi[word_at(index, channel)] = word if valid else 0x7FFF
                 marks[index] |= valid << channel
+            if kind.heard and not kind.outputs:
+                slave.got[0] = self._get(regmap.HOST_OUT_IMG + index // 8 * 4) >> 4 * (index % 8) & 15
             for channel in range(kind.outputs):
                 word = word_at(index, channel)
                 slave.got[channel] = self._get(regmap.HOST_AODI + word // 2 * 4) >> 16 * (word % 2) & 0xFFFF

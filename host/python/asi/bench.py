@@ -72,7 +72,7 @@ class NativeBench:
 
     def get_value(self, slave: int, channel: int) -> int | None:
         """Output word that a slave has received; None: none yet."""
-        return self.net.get_value(slave, channel)
+        return self.net.value(slave, channel)
 
     def set_invalid(self, slave: int, invalid: int, overflow: int) -> None:
         self.net.set_invalid(slave, invalid, overflow)

@@ -20,6 +20,7 @@ class Kind:
     messages: bool = False             # CTT2: objects by index
     safety: bool = False
     group: bool = False                # CTT5: the first of several addresses
+    heard: int = 0                     # words that a simulated slave can be asked for: what it has received
 
 
 PLAIN = Kind("plain")
@@ -30,18 +31,21 @@ def kind_of(io: int, id_: int, id2: int) -> Kind:
     if id_ == 0xB:
         return Kind("safety", safety=True)
     if (io, id_) == (6, 0) and id2 in (0xA, 0xB, 0xC):
-        return Kind("CTT5", 1, 1, group=True)
+        return Kind("CTT5", 1, 1, group=True)  # each member hears a nibble only
     if (io, id2) in ((7, 5), (0xB, 5)) and id_ == 0xA:
-        return Kind("CTT2", 2, 2, True, True)
+        return Kind("CTT2", 2, 2, True, True, heard=2)
     if io != 7:
         return PLAIN
     if (id_, id2) == (5, 5):
-        return Kind("CTT2", 4, 4, True, True)
+        return Kind("CTT2", 4, 4, True, True, heard=4)
     if id_ == 0xA:
-        return {7: Kind("CTT3"), 0xA: Kind("CTT3", 1, 1), 8: Kind("CTT4", 1), 9: Kind("CTT4", 2)}.get(id2, PLAIN)
+        return {7: Kind("CTT3", heard=1), 0xA: Kind("CTT3", 1, 1, heard=1), 8: Kind("CTT4", 1),
+                9: Kind("CTT4", 2)}.get(id2, PLAIN)
     if id_ in (1, 2, 3, 4) and (id_, id2) != (4, 0):
         channels = _CHANNELS[id2 & 3]
-        return Kind("CTT1", *((channels, 0) if id2 & 8 else (0, channels)), strings=id_ == 4)
+        if id2 & 8:
+            return Kind("CTT1", channels, strings=id_ == 4)
+        return Kind("CTT1", 0, channels, strings=id_ == 4, heard=channels)
     return PLAIN
 
 

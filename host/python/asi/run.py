@@ -210,9 +210,8 @@ class Runner:
 
     def receives(self, position: int) -> list[int | None]:
         """Output words that a simulated slave has received."""
-        slave = self.plant.slaves[position]
-        count = 0 if slave.kind.group else slave.kind.outputs
-        return [self.bench.get_value(self._handles[position], channel) for channel in range(count)]
+        heard = self.plant.slaves[position].kind.heard
+        return [self.bench.get_value(self._handles[position], channel) for channel in range(heard)]
 
     # ------------------------------------------------------------ the loop
     def _loop(self, log: TelegramLog) -> None:
