@@ -180,7 +180,8 @@ class FakeBench:
         new = next((s for s in present if s.index == 0), None)
         missing = self._projected().keys() - {s.index for s in present}
         wrong = [s for s in present if s.index and self._projected().get(s.index) != s.codes.word]
-        if new and len(missing) == 1 and not missing & self.seen[1] and not wrong and self._get(regmap.HOST_HOST_CTRL) & 9 == 9 \
+        allowed = self._get(regmap.HOST_HOST_CTRL) & 9 == 9
+        if new and allowed and len(missing) == 1 and not missing & self.seen[1] and not wrong \
                 and self._projected()[min(missing)] == new.codes.word:
             new.index, = missing
             self._event(LogEvent.ADDRESSED, new.index)
@@ -270,7 +271,8 @@ class FakeBench:
             pp = self._get(regmap.HOST_PP + 4 * k).to_bytes(4, "little")
             pi = bytes(self.parameters.get(4 * k + byte, pp[byte]) for byte in range(4))
             self._put(regmap.HOST_PI + 4 * k, int.from_bytes(pi, "little"))
-        bits = (config_ok | (0 in lds) << 1 | assign << 2 | (assign and len(missing) == 1) << 3 | (not protected) << 4 | (phase != Phase.OFFLINE) << 5
+        bits = (config_ok | (0 in lds) << 1 | assign << 2 | (assign and len(missing) == 1) << 3
+                | (not protected) << 4 | (phase != Phase.OFFLINE) << 5
                 | (self.low or not self.good) << 6 | (phase == Phase.OFFLINE) << 7 | 1 << 8)
         self._put(regmap.HOST_FLAGS, bits)
         self._put(regmap.HOST_PHASE, int(phase))

@@ -327,7 +327,7 @@ log = [{ event = "addressed", address = "5B", data = 0 }, { event = "apf" }]
 
 
 def test_values_of_a_rich_plant():
-    """PL-001, SL-009, SL-010: channels, marks, strings, contacts and options arrive as the simulated slaves want them."""
+    """PL-001, SL-009, SL-010: channels, marks, strings, contacts and options arrive as the slaves want them."""
     plant = parse_plant(RICH, "r.toml")
     by_name = {slave.name: slave for slave in plant.slaves}
     first = by_name["In"]
@@ -351,7 +351,7 @@ def test_values_of_a_rich_plant():
 
 
 def test_functions_of_a_rich_plant():
-    """PL-001, FN-020, FN-030, FN-033: a function has number, arguments and what it must end with; names know its letters."""
+    """PL-001, FN-020, FN-030, EX-033: a function has number, arguments and an expected end; names know its letters."""
     plant = parse_plant(RICH, "r.toml")
     clear, change, read, codes = plant.functions
     assert (clear.code, clear.first, clear.time_ns) == (33, 3, 0)
@@ -407,8 +407,8 @@ RICH_WRONG = [
     ('value = []', 'value = [0]', "event #2.value: [0] is not a list of numbers 1 to 2"),
     ('slave = "Door"', 'slave = "Old"', "event #2.slave: not a safety slave"),
     ('auto_clear = 3', 'auto_clear = 4', "host.auto_clear: 4: Input should be less than or equal to 3"),
-    ('auto_clear = 3', 'auto_clear = 3\nauto_address = true', "host.auto_clear: goes with neither automatic addressing"),
-    ('address = "3"\nvalues = [1', 'address = "2"\nvalues = [1', "host.analog #1.address: the slave at 2 has no 16-bit"),
+    ('auto_clear = 3', 'auto_clear = 3\nauto_address = true', "host.auto_clear: goes with neither automatic ad"),
+    ('address = "3"\nvalues = [1', 'address = "2"\nvalues = [1', "host.analog #1.address: the slave at 2 has no 16"),
     ('address = "3"\nvalues = [1', 'address = "30"\nvalues = [1', "host.analog #1.address: no slave of this plant has"),
     ('values = [1, [{ at = "0s"', 'values = [1, 1, [{ at = "0s"', "host.analog #1.values: 3 channels, the slave has 2"),
     ('new = "7A"\n', "", "host.function #1.new: missing"),

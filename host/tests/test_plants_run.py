@@ -31,10 +31,10 @@ def ran(request, tmp_path_factory):
 
 
 def test_plants_keep_their_promise(ran):
-    """PL-004: every check and the final expectation of the plant are met on the whole chip."""
+    """PL-004: every check, every function and the final expectation of the plant are met on the whole chip."""
     plant, result, _ = ran
     assert result["error"] is None
-    assert [check["differences"] for check in result["checks"]] == [[] for _ in plant.checks]
+    assert [check["differences"] for check in result["checks"]] == [[] for _ in (*plant.checks, *plant.functions)]
     assert result["result"] == "ok"
 
 
@@ -65,7 +65,7 @@ def test_only_the_right_slaves_get_data(ran):
     """PL-004: DEXG goes to projected slaves only in protected mode, and to each of them."""
     plant, _, records = ran
     called = {record["index"] for record in records if record["call"] == "DEXG"}
-    present = {slave.index for slave in plant.slaves}
+    present = {slave.index for slave in plant.slaves} | {f.second for f in plant.functions if f.name == "change_address"}
     assert plant.host.protected and called == plant.host.pcd.keys() & present
 
 

@@ -79,6 +79,6 @@ def test_cyclic_words_of_the_id_object():
 
 
 def test_strings_and_the_safety_table():
-    """CT-014, CT-060: three strings of S-7.4; the table that is used when none is given has eight different legal words."""
+    """CT-014, CT-060: three strings of S-7.4; the table used when none is given has eight different legal words."""
     assert S74_STRINGS == {"id": 0, "diagnosis": 1, "parameters": 2}
     assert len(set(SAFETY_TABLE)) == 8 and not {0, 15} & set(SAFETY_TABLE)
