@@ -266,8 +266,8 @@ def test_failures_of_the_chip_are_named(tmp_path, bench, text):
 # ---------------------------------------------------------------- combined transactions, functions, log
 @pytest.mark.parametrize("path", [COMBINED, REPLACEMENT], ids=lambda path: path.stem)
 def test_plants_of_the_new_functions(tmp_path, path):
-    """PL-004, FN-005, FN-020, FN-025, FN-026, FN-030, FN-031: values, strings and functions reach both ends, on a master
-    made of rules."""
+    """PL-004, FN-005, FN-020, FN-025, FN-026, FN-030, FN-031: values, strings and functions reach both ends, on a
+    master made of rules."""
     plant = load_plant(path).with_settle(SETTLE)
     result = Runner(plant, FakeBench(), tmp_path).run()
     assert result["result"] == "ok" and all(check["result"] == "met" for check in result["checks"])
@@ -276,7 +276,7 @@ def test_plants_of_the_new_functions(tmp_path, path):
 
 
 def test_report_shows_values_functions_and_log(tmp_path):
-    """PL-002, FN-025, FN-030, EX-038: value with mark, what the slave has received, function results, events, storage."""
+    """PL-002, FN-025, FN-030, EX-038: value with mark, what the slave has received, functions, events, storage."""
     result = Runner(load_plant(COMBINED).with_settle(SETTLE), FakeBench(), tmp_path, until_ns=350_000_000).run()
     rows = {(row["address"], row["direction"], row["channel"]): row for row in result["analog"]}
     assert rows["1", "in", 1]["value"] == 0xFC18 and rows["1", "in", 1]["valid"] is True
@@ -342,7 +342,7 @@ def test_a_function_without_end_stops_the_run(tmp_path):
 
 
 def test_commits_wait_for_functions_that_change_their_words(tmp_path):
-    """HW-002, FN-010: a commit is not begun while a function without telegrams is open; one with telegrams lets it pass."""
+    """HW-002, FN-010: a commit waits for a function that changes its words, not for one with telegrams."""
     for do, waits in (("store_configuration", True), ("write_id1", False)):
         value = 'value = "1"\n' if do == "write_id1" else ""
         plant = small(("[expect]", f'[[host.function]]\nat = "1040ms"\ndo = "{do}"\n{value}[[event]]\nat = "1045ms"\n'

@@ -179,7 +179,7 @@ def test_no_html_when_not_wanted(tmp_path):
 
 
 def test_page_of_combined_transactions(tmp_path):
-    """PL-005, FN-025, FN-030, EX-038: values with marks, functions with results, the log, history and storage are there;
+    """PL-005, FN-025, FN-030, EX-038: values with marks, functions, the log, history and storage are there;
     a page of plain slaves has no empty tables for them."""
     plant = load_plant(ROOT / "sim/plants/combined.toml").with_settle(SETTLE)
     report = Runner(plant, FakeBench(), tmp_path, until_ns=350_000_000).run()

@@ -366,7 +366,7 @@ def test_functions_of_a_rich_plant():
 
 
 def test_a_replacement_is_a_slave_more():
-    """PL-001, AD-010: the new slave has address 0, the same profile and options, and is an A slave from the factory."""
+    """PL-001: the new slave has address 0, the same profile and options, and is an A slave from the factory."""
     plant = parse_plant(RICH, "r.toml")
     old, new = plant.slaves[3], plant.slaves[-1]
     assert (new.name, new.index, new.present, new.options) == ("Mux (new)", 0, False, old.options)
