@@ -17,15 +17,18 @@ from typer.testing import CliRunner
 
 from asi import cli, regmap, report
 from asi.bench import BenchError, name_waves
-from asi.plant import load_plant, parse_plant
+from asi.plant import Logged, load_plant, parse_plant
 from asi.regmap import ErrorClass, Phase
-from asi.run import Runner, compare
+from asi.run import Runner, Seen, compare
+from asi.status import LogEvent
 from asi.telegram import decode_call, encode_call
 from asi.telegram_log import HEADER, TelegramLog, to_line, to_record
-from asi.window import HostWindow, State
+from asi.window import Analog, Event, HostWindow, State
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGING = ROOT / "sim/plants/packaging.toml"
+COMBINED = ROOT / "sim/plants/combined.toml"
+REPLACEMENT = ROOT / "sim/plants/replacement.toml"
 SETTLE = 20_000_000
 
 SMALL = """
@@ -139,11 +142,11 @@ def test_report_rows(tmp_path):
 
 def test_every_field_of_the_report_is_documented(tmp_path):
     """PL-002: docs/report.md has exactly the keys of the report, and the right exit codes."""
-    result = Runner(small(), FakeBench(), tmp_path).run()
+    result = Runner(load_plant(COMBINED).with_settle(SETTLE), FakeBench(), tmp_path).run()
     text = (ROOT / "docs/report.md").read_text()
     documented = {name for row in re.findall(r"^\| (`.*?) \|", text.split("## report.json")[1], re.M)
                   for name in re.findall(r"`([^`]+)`", row)}
-    assert set(keys(result)) | {"slaves[]", "checks[]"} == documented
+    assert set(keys(result)) | {"slaves[]", "checks[]", "analog[]", "safety[]", "functions[]", "events[]"} == documented
     flags = re.findall(r"`(\w+)`", text.split("state.flags.*` |")[1].splitlines()[0])
     assert set(flags) == set(result["state"]["flags"])
     codes = {match[1]: int(match[0]) for match in re.findall(r"^\| (\d+) \| `(.+?)` \|", text, re.M)}
@@ -251,13 +254,184 @@ def test_world_events_reach_the_bench(tmp_path):
     (dict(boots=False), "the firmware did not start within 100 ms"),
     (dict(applies=False), "commit 1 was not applied within 100 ms"),
     (dict(commit_result=-3), "commit 1 was refused: FW_RESULT = -3"),
-    (dict(sick=True), "the input image was never consistent")])
+    (dict(sick=True), "was never consistent in 50 tries (IN_SEQ)")])
 def test_failures_of_the_chip_are_named(tmp_path, bench, text):
     """PL-002: a chip that does not do its part ends the run with a reason, and the report is still written."""
     plant = small(('"1100ms"', '"1200ms"'), ('las = ["1", "2B"]', 'las = ["1", "2B"]\ninputs = { "1" = "0011" }'))
     result = Runner(plant, FakeBench(**bench), tmp_path).run()
     assert result["result"] == "failed" and text in result["error"] and text in show(result)
     assert json.loads((tmp_path / "report.json").read_text()) == result
+
+
+# ---------------------------------------------------------------- combined transactions, functions, log
+@pytest.mark.parametrize("path", [COMBINED, REPLACEMENT], ids=lambda path: path.stem)
+def test_plants_of_the_new_functions(tmp_path, path):
+    """PL-004, FN-005, FN-020, FN-025, FN-026, FN-030, FN-031: values, strings and functions reach both ends, on a
+    master made of rules."""
+    plant = load_plant(path).with_settle(SETTLE)
+    result = Runner(plant, FakeBench(), tmp_path).run()
+    assert result["result"] == "ok" and all(check["result"] == "met" for check in result["checks"])
+    assert len(result["checks"]) == len(plant.checks) + len(plant.functions)
+    assert plant.duration_ns <= 2_500_000_000
+
+
+def test_report_shows_values_functions_and_log(tmp_path):
+    """PL-002, FN-025, FN-030, EX-038: value with mark, what the slave has received, functions, events, storage."""
+    result = Runner(load_plant(COMBINED).with_settle(SETTLE), FakeBench(), tmp_path, until_ns=350_000_000).run()
+    rows = {(row["address"], row["direction"], row["channel"]): row for row in result["analog"]}
+    assert rows["1", "in", 1]["value"] == 0xFC18 and rows["1", "in", 1]["valid"] is True
+    assert rows["2", "in", 2]["value"] == 0x7FFF and rows["2", "in", 2]["valid"] is False
+    assert rows["3", "out", 2]["value"] == rows["3", "out", 2]["received"] == 0xFF9C
+    assert rows["10", "out", 1]["kind"] == "CTT2" and ("10", "in", 2) not in rows       # its ID object says one word
+    assert [row["result"] for row in result["functions"]] == ["OK", "PROFILE", None]
+    assert result["safety"] == [{"address": "9", "name": "Door switch", "f_in1": True, "f_in2": False}]
+    assert sum(event["event"] == "activated" for event in result["events"]) == 11 and result["events_lost"] == 0
+    text = show(result)
+    for line in (r"2  Temperatures, two channels\s+CTT1\s+in\s+2\s+7FFF 32767  invalid",
+                 r"3  Positioner, two set-points\s+CTT1\s+out  2\s+FF9C -100\s+FF9C -100",
+                 r"read_id_string 4 at 120.000 ms: OK after", r"write_parameter 4 0111 at 170.000 ms: PROFILE",
+                 r"9 F-IN1=1 F-IN2=0", r"storage\s+NO_FLASH, set 0", r"activated 5B", r"\.\.\. 2 before these"):
+        assert re.search(line, text), line
+
+
+def test_function_that_ends_otherwise(tmp_path):
+    """PL-004: a function with another result, answer or string is a check that is not met, with its own line."""
+    plant = load_plant(COMBINED).with_settle(SETTLE)
+    bench = FakeBench(refuse={31: -24})
+    bench_add = bench.add
+
+    def add(slave):
+        handle = bench_add(slave)
+        bench.slaves[handle].strings = {0: b"other"}
+        return handle
+    bench.add = add
+    result = Runner(plant, bench, tmp_path).run()
+    assert result["result"] == "expectation not met"
+    assert [check["differences"] for check in result["checks"] if check["name"] == "function"] == [
+        ["read_id_string 4: string 6f 74 68 65 72, expected 00 b7 03 00 00 03 2a 11 01"], [],
+        ["message 10 10 00 05: DEVICE, expected OK"]]
+
+
+def test_functions_wait_for_each_other_and_outputs_do_not(tmp_path):
+    """FN-032, PL-004: a slow function holds the next one back, not the outputs; what was not answered is said."""
+    bench = FakeBench(function_ns=200_000_000)
+    result = Runner(load_plant(COMBINED).with_settle(SETTLE), bench, tmp_path).run()
+    asked = [time for time, addr, _ in bench.writes if addr == regmap.HOST_FN_SEQ]
+    first, second = result["functions"][:2]
+    assert len(asked) == 3 and asked[1] >= asked[0] + 200_000_000
+    assert second["at_ns"] < first["answered_ns"] <= second["asked_ns"]
+    outputs = [time for time, addr, data in bench.writes if addr == regmap.HOST_AODI + 24 and data >> 16 == 0xFF9C]
+    assert 320_000_000 <= outputs[0] <= 330_000_000
+    never = Runner(load_plant(COMBINED).with_settle(SETTLE), FakeBench(function_ns=10**12), tmp_path).run()
+    assert [c["differences"] for c in never["checks"] if c["name"] == "function"][0] == [
+        "read_id_string 4: not answered"]
+    short = Runner(load_plant(COMBINED).with_settle(SETTLE), FakeBench(), tmp_path, until_ns=60_000_000).run()
+    assert {c["result"] for c in short["checks"]} == {"not reached"} and short["result"] == "ok"
+
+
+def test_a_function_without_end_stops_the_run(tmp_path):
+    """PL-002, FN-032: no answer for a minute is a failure of the simulation, not a wait without end."""
+    plant = small(("[expect]", '[[host.function]]\nat = "1050ms"\ndo = "store_parameters"\n[expect]'),
+                  ('"1100ms"', '"70s"'))
+    bench = FakeBench(function_ns=10**12)
+    run = bench.run
+    bench.run = lambda until_ns: run(until_ns) if bench.now < 80_000_000 else setattr(
+        bench, "now", bench.now + 10**9) or bench.now
+    result = Runner(plant, bench, tmp_path).run()
+    assert result["result"] == "failed" and "store_parameters: no answer within 60 s" in result["error"]
+
+
+def test_commits_wait_for_functions_that_change_their_words(tmp_path):
+    """HW-002, FN-010: a commit waits for a function that changes its words, not for one with telegrams."""
+    for do, waits in (("store_configuration", True), ("write_id1", False)):
+        value = 'value = "1"\n' if do == "write_id1" else ""
+        plant = small(("[expect]", f'[[host.function]]\nat = "1040ms"\ndo = "{do}"\n{value}[[event]]\nat = "1045ms"\n'
+                                   'do = "data_exchange"\nvalue = false\n[expect]'))
+        bench = FakeBench(function_ns=20_000_000)
+        Runner(plant, bench, tmp_path).run()
+        commit = [time for time, addr, _ in bench.writes if addr == regmap.HOST_HOST_SEQ][1]
+        assert (commit >= 80_000_000) == waits and commit >= 65_000_000
+
+
+def test_auto_clear_is_a_function_at_the_start(tmp_path):
+    """EX-033, PL-004: the host sets auto clear once its first commit is applied."""
+    plant = small(('mode = "protected"', 'mode = "protected"\nauto_clear = 2'))
+    bench = FakeBench()
+    result = Runner(plant, bench, tmp_path).run()
+    assert (bench.host_read(regmap.HOST_FN_CODE), bench.host_read(regmap.HOST_FN_ARG)) == (33, 2)
+    order = [addr for _, addr, _ in bench.writes if addr in (regmap.HOST_HOST_SEQ, regmap.HOST_FN_SEQ)]
+    assert order == [regmap.HOST_HOST_SEQ, regmap.HOST_FN_SEQ] and result["result"] == "ok"
+
+
+def test_world_of_combined_slaves_reaches_the_bench(tmp_path):
+    """PL-004, SL-009: values, marks and contacts arrive at the right slave; both marks are told together."""
+    story = "".join(f'[[event]]\nat = "{at}ms"\ndo = "{do}"\nslave = "In"\nvalue = {value}\n' for at, do, value in
+                    ((1030, "overflow", [1, 2]), (1040, "invalid", [2]), (1050, "overflow", [])))
+    plant = small(("[expect]", '[[slave]]\nname = "In"\naddress = "4"\nprofile = "S-7.3.D"\ninvalid = [1]\n'
+                               'values = [3, [{ at = "1020ms", value = -1 }]]\n[[slave]]\nname = "Door"\n'
+                               'address = "5"\nprofile = "S-0.B"\n' + story +
+                               '[[event]]\nat = "1060ms"\ndo = "contacts"\nslave = "Door"\nvalue = [2]\n[expect]'),
+                  ('las = ["1", "2B"]', 'las = ["1", "2B", "4", "5"]'))
+    bench, calls = FakeBench(), []
+    for name in ("set_value", "set_invalid", "set_safety"):
+        def spy(*args, name=name, work=getattr(bench, name)):
+            calls.append((bench.now // 1_000_000 - 20, name, *args))
+            return work(*args)
+        setattr(bench, name, spy)
+    result = Runner(plant, bench, tmp_path).run()
+    assert result["result"] == "ok"
+    assert [call[1:] for call in calls] == [
+        ("set_value", 2, 1, 0xFFFF), ("set_invalid", 2, 1, 3), ("set_invalid", 2, 2, 3), ("set_invalid", 2, 2, 0),
+        ("set_safety", 3, plant.slaves[3].safety.table, 2)]
+    assert [call[0] for call in calls] == [20, 30, 40, 50, 60]
+
+
+def test_compare_names_differences_of_the_new_kinds():
+    """PL-004: parameters, values, received words, log, LPF and suspects; what nobody has looked at is not met."""
+    plant = small(('las = ["1", "2B"]', """
+lpf = ["1"]
+suspects = []
+parameters = { "1" = "0101" }
+analog = { "1" = [5, "invalid", "any", -1] }
+log = [{ event = "addressed", address = "1" }, { event = "apf", data = 1 }]"""))
+    check = plant.checks[-1]
+    state = State({}, Phase.DATA_EXCHANGE, frozenset(), frozenset(), frozenset(), frozenset({1}), {})
+    values = [Analog(5, True), Analog(0x7FFF, False), Analog(9, False), Analog(0xFFFF, True)]
+    events = [Event(1, LogEvent.APF, 0, 1), Event(2, LogEvent.ADDRESSED, 1, 0), Event(3, LogEvent.APF, 0, 1)]
+    seen = Seen(frozenset(), [0, 5], {1: values}, {}, events)
+    assert compare(check, state, None, None, plant.name_of, seen) == []
+    values = [Analog(5, False), Analog(0x7FFF, True), Analog(9, True), Analog(0xFFFE, True)]
+    assert compare(check, state, None, None, plant.name_of, Seen(frozenset({3}), [0, 4], {1: values}, {}, events[:2])) \
+        == ["SUSPECTS too many: 3", "parameter 1 is 0100, expected 0101",
+            "value 1 channel 1 is 0005 (5) (invalid), expected 0005 (5)",
+            "value 1 channel 2 is 7FFF (32767), expected invalid", "value 1 channel 4 is FFFE (-2), expected FFFF (-1)",
+            "log: no apf after the events before"]
+    assert compare(check, state, None, None, plant.name_of) == [
+        "suspects were not looked at", "parameter 1 is not known, expected 0101",
+        *(f"value 1 channel {k} is not known, expected {text}" for k, text in
+          ((1, "0005 (5)"), (2, "invalid"), (4, "FFFF (-1)"))), "log: no addressed 1"]
+    assert Logged(LogEvent.APF, None, 1) == check.log[1]
+
+
+def test_the_log_is_read_while_it_lasts(tmp_path):
+    """EX-038, PL-002: events that were overwritten are counted in the report and shown."""
+    bench = FakeBench()
+    run, flooded = bench.run, []
+
+    def flood(until_ns):
+        out = run(until_ns)
+        if bench.now > 60_000_000 and not flooded:
+            flooded.append(bench.now)
+            for _ in range(70):
+                bench._event(LogEvent.SUSPECT, 3)
+        return out
+    bench.run = flood
+    result = Runner(small(), bench, tmp_path).run()
+    assert sum(event["event"] == "suspect" for event in result["events"]) == 64 and result["events_lost"] == 6
+    assert [event["event"] for event in result["events"]].index("activated") < 4
+    assert "6 lost: the reader was too slow" in show(result)
+    page = (tmp_path / "report.html").read_text()
+    assert "events were overwritten before they were read" in page
 
 
 # ---------------------------------------------------------------- telegram log

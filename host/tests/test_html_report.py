@@ -178,6 +178,30 @@ def test_no_html_when_not_wanted(tmp_path):
     assert result == again
 
 
+def test_page_of_combined_transactions(tmp_path):
+    """PL-005, FN-025, FN-030, EX-038: values with marks, functions, the log, history and storage are there;
+    a page of plain slaves has no empty tables for them."""
+    plant = load_plant(ROOT / "sim/plants/combined.toml").with_settle(SETTLE)
+    report = Runner(plant, FakeBench(), tmp_path, until_ns=350_000_000).run()
+    page = Page((tmp_path / "report.html").read_text())
+    shown = {attrs["data-path"]: page.texts[number] for number, attrs in page.all("span") if "data-path" in attrs}
+    for k, row in enumerate(report["analog"]):
+        assert shown[f"analog.{k}.value"].startswith(f"{row['value']:04X} (")
+        assert shown.get(f"analog.{k}.valid") == {True: "valid", False: "invalid", None: None}[row["valid"]]
+    assert [shown[f"functions.{k}.result"] for k in range(3)] == ["OK", "PROFILE", "no answer"]
+    (table, _), = page.all("table", id="log")
+    cells = [page.texts[number] for number, attrs in page.all("td") if number > table]
+    assert [event["text"] for event in report["events"]] == cells[1:2 * len(report["events"]):2]
+    assert {"asks: read_id_string 4", "read_id_string 4: OK", "activated 5B"} <= {
+        what for _, _, what in page.data()["timeline"]["events"]}
+    texts = " ".join(page.texts[number] for number, _ in page.all("dd"))
+    assert "NO_FLASH, set 0" in texts and "F-IN1 1, F-IN2 0" in texts and "nothing to tell" in texts
+    plain = load_plant(ROOT / "sim/plants/packaging.toml").with_settle(SETTLE)
+    Runner(plain, FakeBench(), tmp_path, until_ns=30_000_000).run()
+    page = Page((tmp_path / "report.html").read_text())
+    assert not page.all("table", id="analog") and not page.all("table", id="functions")
+
+
 # ---------------------------------------------------------------- safety
 def test_page_needs_and_may_load_nothing(packaging):
     """PL-006: no address to load from, no script or style beside ours, the policy allows ours only, by its hash."""
@@ -204,7 +228,7 @@ duration = "1100ms"
 [[slave]]
 name = {quoted}
 address = "1"
-profile = "S-0.0"
+profile = "S-7.3.C"
 [[slave]]
 address = "2"
 profile = "S-0.0"
@@ -229,6 +253,7 @@ def test_texts_stay_texts(tmp_path):
     (number, _), = page.all("h1")
     assert page.texts[number].startswith(HOSTILE)
     assert any(HOSTILE in page.texts[number] for number, attrs in page.all("td", data_key="name"))
+    assert any(page.texts[number] == HOSTILE for number, attrs in page.all("td") if "data-key" not in attrs)
     assert any(HOSTILE in what for _, kind, what in page.data()["timeline"]["events"] if kind == "world")
 
 
@@ -466,4 +491,8 @@ EMPTY_REPORT = {
     "telegrams": {"requests": 0, "repeated": 0, "failed": 0, "bad_requests": 0, "by_call": {}, "by_class": {}},
     "master": {}, "core": {"interrupts": 0, "longest_busy_clocks": 0, "longest_busy_in_cycle_clocks": 0},
     "start": {"first_telegram_ns": None, "first_cycle_ns": None, "start_up_ns": None}, "phases_ns": {}, "checks": [],
+    "analog": [], "safety": [], "functions": [], "events": [], "events_lost": 0, "events_left_out": 0,
+    "history": {"changed": [], "changed_us": None, "offline_causes": [], "last_offline_cause": None, "offline_us": None,
+                "suspects": []},
+    "storage": {"state": "NO_FLASH", "busy": False, "failed": False, "saved": False, "sequence": 0},
 }

@@ -7,7 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from asi.plant import SETTLE_NS, Codes, PlantError, load_plant, parse_nibble, parse_plant, parse_time
+from asi.combined import SAFETY_TABLE
+from asi.plant import (SETTLE_NS, Codes, Logged, Options, PlantError, Safety, load_plant, parse_bytes, parse_nibble,
+                       parse_numbers, parse_plant, parse_time)
+from asi.status import LogEvent, Status
 
 PLANTS = Path(__file__).resolve().parents[2] / "sim/plants"
 SHIPPED = sorted(PLANTS.glob("*.toml"))
@@ -234,6 +237,222 @@ def test_each_fault_has_its_line(old, new, line):
     assert len(lines) == (2 if "valu = " in new else 1), lines
 
 
+# a second plant: combined transactions, options, functions, a replacement
+RICH = """
+name = "Rich"
+description = "What is more than a nibble."
+duration = "2s"
+[host]
+mode = "protected"
+auto_clear = 3
+[[host.analog]]
+address = "3"
+values = [1, [{ at = "0s", value = -1 }, { at = "1s", value = 0xFFFE }]]
+[[host.function]]
+at = "1100ms"
+do = "change_address"
+address = "5B"
+new = "7A"
+result = "ADDRESS_USED"
+[[host.function]]
+at = "1200ms"
+do = "read_id_string"
+address = "4"
+answer = "00 b7 03"
+[[host.function]]
+at = "1300ms"
+do = "set_permanent_configuration"
+address = "9"
+profile = "S-3.1"
+[[slave]]
+name = "In"
+address = "2"
+profile = "S-7.3.D"
+values = [-2, [{ at = "10ms", value = 5 }]]
+repeat = "100ms"
+invalid = [2]
+overflow = [1, 2]
+[[slave]]
+name = "Out"
+address = "3"
+profile = "S-7.3.5"
+[[slave]]
+name = "Meter"
+address = "4"
+profile = "S-7.4.C"
+strings = { id = "00 B7 03", parameters = "010203" }
+write_time = "100ms"
+write_fails = true
+[[slave]]
+name = "Mux"
+address = "5B"
+profile = "S-7.A.7"
+id1_locked = true
+[[slave]]
+name = "Door"
+address = "6"
+profile = "S-0.B"
+safety = { closed = [2] }
+[[slave]]
+name = "Old"
+address = "7"
+profile = "S-0.0"
+old = true
+[[slave]]
+name = "Drive"
+address = "8"
+profile = "S-7.5.5"
+strings = { id = "00 2A 00 01 22", "17" = "01" }
+[[event]]
+at = "1400ms"
+do = "replace"
+slave = "Mux"
+[[event]]
+at = "1500ms"
+do = "contacts"
+slave = "Door"
+value = []
+[[event]]
+at = "1600ms"
+do = "periphery_fault"
+slave = "Mux (new)"
+[expect]
+lpf = []
+suspects = ["2"]
+parameters = { "2" = "0101" }
+analog = { "2" = [-2, "invalid"] }
+received = { "Out" = [1, "any"] }
+log = [{ event = "addressed", address = "5B", data = 0 }, { event = "apf" }]
+"""
+
+
+def test_values_of_a_rich_plant():
+    """PL-001, SL-009, SL-010: channels, marks, strings, contacts and options arrive as the slaves want them."""
+    plant = parse_plant(RICH, "r.toml")
+    by_name = {slave.name: slave for slave in plant.slaves}
+    first = by_name["In"]
+    assert (first.values, first.invalid, first.overflow) == ((0xFFFE, 0), 2, 3)
+    assert by_name["Meter"].strings == {0: bytes.fromhex("00B703"), 2: b"\1\2\3"}
+    assert by_name["Meter"].options == Options(100_000_000, write_fails=True)
+    assert by_name["Drive"].strings == {0: bytes.fromhex("002A000122"), 17: b"\1"}
+    assert by_name["Door"].safety == Safety(SAFETY_TABLE, 2) and first.safety is None
+    assert by_name["Old"].options == Options(old=True) and by_name["Mux"].options == Options(id1_locked=True)
+    actions = plant.actions()
+    assert [(a.time_ns, a.slaves, a.value) for a in actions if a.do == "value"][:2] == [
+        (10_000_000, (0,), (1, 5)), (110_000_000, (0,), (1, 5))]
+    assert plant.host.analog == {3: (1, 0xFFFF)}
+    assert [(a.time_ns, a.value) for a in actions if a.do == "analog"] == [(0, (3, 1, 0xFFFF)),
+                                                                         (10**9, (3, 1, 0xFFFE))]
+    assert [(a.slaves, a.value) for a in actions if a.do == "contacts"] == [((4,), 0)]
+    expect = plant.checks[-1]
+    assert (expect.lpf, expect.suspects, expect.parameters) == (frozenset(), {2}, {2: 5})
+    assert expect.analog == {2: (0xFFFE, "invalid")} and expect.received == {1: (1, "any")}
+    assert expect.log == (Logged(LogEvent.ADDRESSED, 37, 0), Logged(LogEvent.APF))
+
+
+def test_functions_of_a_rich_plant():
+    """PL-001, FN-020, FN-030, EX-033: a function has number, arguments and an expected end; names know its letters."""
+    plant = parse_plant(RICH, "r.toml")
+    clear, change, read, codes = plant.functions
+    assert (clear.code, clear.first, clear.time_ns) == (33, 3, 0)
+    assert (change.code, change.first, change.second, change.status) == (20, 37, 7, Status.ADDRESS_USED)
+    assert (read.code, read.first, read.answer, read.status) == (30, 4, bytes.fromhex("00B703"), 0)
+    assert (codes.code, codes.first, codes.second) == (8, 9, 0xFF13)
+    assert change.text == "change_address 5B 7A" and codes.text == "set_permanent_configuration 9 S-3.1.F ID1 F"
+    assert [(a.time_ns, a.value) for a in plant.actions() if a.do == "function"] == [
+        (0, 0), (1_100_000_000, 1), (1_200_000_000, 2), (1_300_000_000, 3)]
+    assert plant.name_of(7) == "7A" and plant.name_of(9) == "9"
+    assert [f.time_ns for f in plant.with_settle(20_000_000).functions] == [0, 120_000_000, 220_000_000, 320_000_000]
+
+
+def test_a_replacement_is_a_slave_more():
+    """PL-001: the new slave has address 0, the same profile and options, and is an A slave from the factory."""
+    plant = parse_plant(RICH, "r.toml")
+    old, new = plant.slaves[3], plant.slaves[-1]
+    assert (new.name, new.index, new.present, new.options) == ("Mux (new)", 0, False, old.options)
+    assert (old.codes.id1, new.codes.id1) == (15, 7) and new.codes.profile == old.codes.profile
+    deeds = [(a.time_ns, a.do, a.slaves) for a in plant.actions() if a.time_ns >= 1_400_000_000 and a.slaves != (0,)]
+    assert deeds == [(1_400_000_000, "drop", (3,)), (1_400_000_000, "connect", (7,)),
+                     (1_500_000_000, "contacts", (4,)), (1_600_000_000, "periphery_fault", (7,))]
+    everyone, = (a for a in parse_plant(RICH.replace('do = "contacts"\nslave = "Door"\nvalue = []',
+                                                     'do = "quiet"\nslave = "all"')).actions() if a.do == "quiet")
+    assert everyone.slaves == tuple(range(7))   # the replacement comes by its own event only
+
+
+RICH_WRONG = [
+    ('values = [-2,', 'values = [-32769,', "slave #1 (In).values #1: -32769 is not a 16-bit value"),
+    ('values = [-2,', 'values = [true,', "slave #1 (In).values #1: True is not a 16-bit value"),
+    ('values = [-2,', 'values = [1, 2,', "slave #1 (In).values: 3 channels, S-7.3.D has 2"),
+    ('[{ at = "10ms", value = 5 }]]', '2]', "slave #1 (In).repeat: neither inputs nor one of values is a list"),
+    ('value = 5 }', 'value = 5 }, { at = "1ms", value = 6 }', "slave #1 (In).values #2 #2.at: not later than"),
+    ('invalid = [2]', 'invalid = [3]', "slave #1 (In).invalid: [3] is not a list of numbers 1 to 2"),
+    ('invalid = [2]', 'invalid = 2', "slave #1 (In).invalid: 2 is not a list of numbers 1 to 2"),
+    ('"S-7.3.5"\n', '"S-7.3.5"\nvalues = [1]\n', "slave #2 (Out).values: S-7.3.5 has no 16-bit inputs"),
+    ('"S-7.3.5"\n', '"S-7.3.5"\noverflow = [1]\n', "slave #2 (Out).overflow: S-7.3.5 sends no valid and overflow"),
+    ('"S-7.3.5"\n', '"S-6.0.B"\nvalues = [1]\n', "slave #2 (Out).values: S-6.0.B has no 16-bit inputs: give each"),
+    ('id = "00 B7 03"', 'id = "00 B7 3"', "slave #3 (Meter).strings.id: '00 B7 3' is not a string of bytes"),
+    ('id = "00 B7 03"', '"1" = "00"', "slave #3 (Meter).strings.'1': S-7.4.C has no such string"),
+    ('"17" = "01"', '"256" = "01"', "slave #7 (Drive).strings.'256': S-7.5.5 has no such string"),
+    ('write_time = "100ms"', 'write_time = "2s"', "slave #3 (Meter).write_time: longer than 1s"),
+    ('id1_locked = true', 'id1_locked = 1', "slave #4 (Mux).id1_locked: 1 is not true or false"),
+    ('closed = [2]', 'closed = [3]', "slave #5 (Door).safety.closed: [3] is not a list of numbers 1 to 2"),
+    ('closed = [2]', 'table = ["0001"]', "slave #5 (Door).safety.table: "),
+    ('"S-0.B"', '"S-0.0"', "slave #5 (Door).safety: S-0.0.F is no safety slave"),
+    ('old = true', 'old = true\nid1 = "3"', "slave #6 (Old).old: a slave without ID1 and ID2 is no A/B slave"),
+    ('slave = "Mux"', 'slave = "all"', "event #1.slave: 'all' cannot be replaced"),
+    ('slave = "Mux"', 'slave = "Mux"\nrepeat = "1s"', "event #1.repeat: a slave is replaced once"),
+    ('slave = "Mux"', 'slave = "Mux"\nvalue = 1', "event #1.value: 'replace' takes no value"),
+    ('do = "contacts"\nslave = "Door"\nvalue = []', 'do = "replace"\nslave = "Mux"',
+     "event #2.slave: 'Mux' is replaced twice"),
+    ('value = []', 'value = [0]', "event #2.value: [0] is not a list of numbers 1 to 2"),
+    ('slave = "Door"', 'slave = "Old"', "event #2.slave: not a safety slave"),
+    ('auto_clear = 3', 'auto_clear = 4', "host.auto_clear: 4: Input should be less than or equal to 3"),
+    ('auto_clear = 3', 'auto_clear = 3\nauto_address = true', "host.auto_clear: goes with neither automatic ad"),
+    ('address = "3"\nvalues = [1', 'address = "2"\nvalues = [1', "host.analog #1.address: the slave at 2 has no 16"),
+    ('address = "3"\nvalues = [1', 'address = "30"\nvalues = [1', "host.analog #1.address: no slave of this plant has"),
+    ('values = [1, [{ at = "0s"', 'values = [1, 1, [{ at = "0s"', "host.analog #1.values: 3 channels, the slave has 2"),
+    ('new = "7A"\n', "", "host.function #1.new: missing"),
+    ('new = "7A"\n', 'new = "7A"\nvalue = 1\n', "host.function #1.value: 'change_address' takes no value"),
+    ('"ADDRESS_USED"', '"USED"', "host.function #1.result: 'USED' is not 'OK' or an error: ARG, STATE"),
+    ('new = "7A"\n', 'new = "7A"\ndata = "1"\n', "host.function #1.data: 'change_address' answers with no nibble"),
+    ('new = "7A"\n', 'new = "7A"\nanswer = "01"\n', "host.function #1.answer: 'change_address' answers with no str"),
+    ('"read_id_string"', '"read_id"', "host.function #2.do: 'read_id': Input should be 'set_permanent_parameter'"),
+    ('do = "read_id_string"\naddress = "4"\nanswer = "00 b7 03"', 'do = "execute"\naddress = "4"\nvalue = "1"',
+     "host.function #2.value: '1' is not five binary digits I4..I0"),
+    ('do = "read_id_string"\naddress = "4"\nanswer = "00 b7 03"', 'do = "write_id1"\nvalue = "2222"',
+     "host.function #2.value: '2222' is not a nibble"),
+    ('do = "read_id_string"\naddress = "4"\nanswer = "00 b7 03"', 'do = "set_auto_clear"\nvalue = 4',
+     "host.function #2.value: 4 is not a number 0 to 3"),
+    ('profile = "S-3.1"\n', "", "host.function #3.profile: missing: give a profile, or io and id"),
+    ('suspects = ["2"]', 'suspects = "2"', "expect.suspects: '2' is not a list of addresses"),
+    ('"2" = "0101"', '"x" = "0101"', "expect.parameters.'x': 'X' is not an AS-i address"),
+    ('[-2, "invalid"]', '[-2, "bad"]', "expect.analog.2 #2: 'bad' is not a 16-bit value, 'invalid' or 'any'"),
+    ('[-2, "invalid"]', '[1, 2, 3, 4, 5]', "expect.analog.'2': index 2 has no channel 4"),
+    ('"Out" = [1, "any"]', '"In" = [1]', "expect.received.'In': not one slave with that many outputs"),
+    ('"Out" = [1, "any"]', '"Gone" = [1]', "expect.received.'Gone': no slave is called 'Gone'"),
+    ('{ event = "apf" }', '{ event = "APF" }', "expect.log #2.event: 'APF' is not an event: start, phase, offline"),
+    ('data = 0 }', 'data = -1 }', "expect.log #1.data: -1: Input should be greater than or equal to 0"),
+    ('address = "5B", data', 'address = 5, data', "expect.log #1.address: 5 is not an address: write it in quotes"),
+]
+
+
+@pytest.mark.parametrize("old, new, line", RICH_WRONG, ids=[line[:50] for *_, line in RICH_WRONG])
+def test_each_fault_of_a_rich_plant_has_its_line(old, new, line):
+    """PL-001: one line for one fault of values, strings, options, functions and expectations: file, key, reason."""
+    assert RICH.count(old) == 1
+    lines = faults(RICH.replace(old, new))
+    assert lines[0].startswith(f"p.toml: {line}") and len(lines) == 1, lines
+
+
+def test_bytes_and_numbers():
+    """PL-001: strings are pairs of hexadecimal digits, at most 224 bytes; channels count from 1."""
+    assert parse_bytes(" 0a FF\n01") == b"\x0a\xff\x01" and len(parse_bytes("00" * 224)) == 224
+    for bad in ("", "0", "0 1", "0G", 10, None, "00" * 225):
+        with pytest.raises(ValueError):
+            parse_bytes(bad)
+    assert parse_numbers([3, 1, 3], 4) == 0b101 and parse_numbers([], 2) == 0
+
+
 def test_all_faults_are_reported_together():
     """PL-001: several faults give several lines."""
     lines = faults(GOOD.replace('slave = "7"', 'slave = "8"').replace('las = ["5A", "5B"]', ""))
@@ -276,7 +495,8 @@ def to_toml(value):
 
 SCALARS = st.one_of(st.integers(-2**70, 2**70), st.booleans(), st.floats(), st.text(max_size=8),
                     st.sampled_from(["5", "5A", "31B", "0", "1-31", "all", "S-7.A", "1s", "-1us", "0011", "F"]))
-KEYS = st.sampled_from(["at", "do", "slave", "value", "address", "profile", "name", "inputs", "repeat", "x y", ""])
+KEYS = st.sampled_from(["at", "do", "slave", "value", "address", "profile", "name", "inputs", "repeat", "values",
+                        "strings", "string", "new", "invalid", "safety", "log", "x y", ""])
 VALUES = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=3),
                       max_leaves=6)
 
@@ -294,7 +514,7 @@ def spots(data, path=()):
 def test_no_malformed_plant_makes_a_traceback(data):
     """PL-001: a plant with any value replaced, removed or added is loaded or refused in lines, never a traceback."""
     import tomllib
-    plant = copy.deepcopy(tomllib.loads(GOOD))
+    plant = copy.deepcopy(tomllib.loads(data.draw(st.sampled_from([GOOD, RICH]))))
     for _ in range(data.draw(st.integers(1, 3))):
         *path, last = data.draw(st.sampled_from([p for p in spots(plant) if p]))
         place = plant
@@ -326,8 +546,9 @@ def test_no_text_makes_a_traceback(text):
 
 
 def test_the_shipped_plants():
-    """PL-004: four plants are shipped; each is good and says what to expect of lists and flags."""
-    assert [path.stem for path in SHIPPED] == ["extended62", "faults", "packaging", "standard31"]
+    """PL-004: the plants that are shipped are good and say what to expect of lists and flags."""
+    assert [path.stem for path in SHIPPED] == ["combined", "extended62", "faults", "packaging", "replacement",
+                                               "standard31"]
     plants = {path.stem: load_plant(path) for path in SHIPPED}
     for plant in plants.values():
         expect = plant.checks[-1]
@@ -338,3 +559,6 @@ def test_the_shipped_plants():
     profiles = {s.codes.profile[:5] for s in plants["packaging"].slaves}
     assert profiles == {"S-0.0", "S-3.0", "S-7.0", "S-8.0", "S-0.A", "S-3.A", "S-7.A"}
     assert {a.do for a in plants["faults"].actions()} >= {"drop", "connect", "noise", "quiet", "power_off", "power_on"}
+    kinds = {slave.kind.name for slave in plants["combined"].slaves}
+    assert kinds == {"CTT1", "CTT2", "CTT3", "CTT5", "plain", "safety"}
+    assert plants["replacement"].host.auto_address and plants["replacement"].slaves[-1].index == 0

@@ -31,10 +31,10 @@ def ran(request, tmp_path_factory):
 
 
 def test_plants_keep_their_promise(ran):
-    """PL-004: every check and the final expectation of the plant are met on the whole chip."""
+    """PL-004: every check, every function and the final expectation of the plant are met on the whole chip."""
     plant, result, _ = ran
     assert result["error"] is None
-    assert [check["differences"] for check in result["checks"]] == [[] for _ in plant.checks]
+    assert [check["differences"] for check in result["checks"]] == [[] for _ in (*plant.checks, *plant.functions)]
     assert result["result"] == "ok"
 
 
@@ -66,6 +66,7 @@ def test_only_the_right_slaves_get_data(ran):
     plant, _, records = ran
     called = {record["index"] for record in records if record["call"] == "DEXG"}
     present = {slave.index for slave in plant.slaves}
+    present |= {function.second for function in plant.functions if function.name == "change_address"}
     assert plant.host.protected and called == plant.host.pcd.keys() & present
 
 
@@ -76,3 +77,19 @@ def test_full_networks_keep_the_cycle(ran):
     if len({index & 31 for index in plant.host.pcd}) == 31:
         assert cycles["max_ns"] <= 4_950_000 and cycles["max_ns"] - cycles["min_ns"] <= 1e9 / result["run"]["clk_hz"]
     assert cycles["count"] > 20
+
+
+def test_a_replaced_slave_gets_its_address_by_itself(ran):
+    """AD-008, AD-010, EX-030: the old one gets six requests more, the new one is in data exchange within 1.0 s."""
+    plant, _, records = ran
+    for new, slave in enumerate(plant.slaves):
+        if not slave.name.endswith(" (new)"):
+            continue
+        old = next(k for k, other in enumerate(plant.slaves) if f"{other.name} (new)" == slave.name)
+        taken_ns, = (a.time_ns for a in plant.actions() if a.do == "connect" and a.slaves == (new,))
+        calls = [record for record in records if record["index"] == plant.slaves[old].index
+                 and record["call"] == "DEXG" and record["t_ns"] >= taken_ns - 500_000]
+        first = next(k for k, record in enumerate(calls) if record["class"] != "OK")    # it may be on the line already
+        again = next(k for k, record in enumerate(calls) if k > first and record["class"] == "OK")
+        assert again - first == 6 and calls[again]["t_ns"] - taken_ns <= 1_000_000_000
+        assert plant.slaves[new].options.write_ns == 100_000_000

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from asi.plant import Faults, Slave
+from asi.plant import Faults, Options, Slave
 
 
 class BenchError(Exception):
@@ -38,9 +38,20 @@ class NativeBench:
         return self.net.pulse_counts()
 
     def add(self, slave: Slave) -> int:
-        codes = slave.codes
-        return self.net.add(address=slave.index, io=codes.io, id=codes.id, id1=codes.id1, id2=codes.id2,
-                            inputs=slave.inputs, watchdog=slave.watchdog, present=slave.present)
+        codes, net = slave.codes, self.net
+        handle = net.add(address=slave.index, io=codes.io, id=codes.id, id1=codes.id1, id2=codes.id2,
+                         inputs=slave.inputs, watchdog=slave.watchdog, present=slave.present)
+        if slave.options != Options():
+            net.set_options(handle, **vars(slave.options))
+        for channel, word in enumerate(slave.values):
+            net.set_value(handle, channel, word)
+        if slave.invalid or slave.overflow:
+            net.set_invalid(handle, slave.invalid, slave.overflow)
+        for kind, string in slave.strings.items():
+            net.set_string(handle, kind, string)
+        if slave.safety is not None:
+            net.set_safety(handle, slave.safety.table, slave.safety.closed)
+        return handle
 
     def set_inputs(self, slave: int, nibble: int) -> None:
         self.net.set_inputs(slave, nibble)
@@ -55,6 +66,19 @@ class NativeBench:
         self.net.set_faults(slave, p_no_answer=faults.no_answer, p_parity=faults.parity,
                             p_missing_pulse=faults.missing_pulse, p_shifted_pulse=faults.shifted_pulse,
                             p_extra_pulse=faults.extra_pulse, shift_ns=faults.shift_ns, delay_ns=faults.delay_ns)
+
+    def set_value(self, slave: int, channel: int, word: int) -> None:
+        self.net.set_value(slave, channel, word)
+
+    def get_value(self, slave: int, channel: int) -> int | None:
+        """Output word that a slave has received; None: none yet."""
+        return self.net.value(slave, channel)
+
+    def set_invalid(self, slave: int, invalid: int, overflow: int) -> None:
+        self.net.set_invalid(slave, invalid, overflow)
+
+    def set_safety(self, slave: int, table: tuple[int, ...], closed: int) -> None:
+        self.net.set_safety(slave, table, closed)
 
     def power(self, good: bool) -> None:
         self.net.power(good)

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 from asi import eye
 from asi.checks import WIN_EARLY_NS, WIN_LATE_NS
 from asi.regmap import ErrorClass
+from asi.report import history_lines, storage_line
 from asi.telegram import BIT_NS, HALF_BIT_NS
 from asi.trace import Trace
 
@@ -49,7 +50,7 @@ def _ms(time_ns: float | None) -> str:
 
 def _at(report: dict[str, Any], path: str) -> Any:
     for key in path.split("."):
-        report = report[key]
+        report = report[int(key) if isinstance(report, list) else key]
     return report
 
 
@@ -298,6 +299,53 @@ def _events(trace: Trace) -> str:
             f'<tbody>{rows}</tbody></table></div>{more}')
 
 
+def _table(name: str, label: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Cells are HTML already."""
+    body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
+    cells = "".join(f'<th scope="col">{escape(text)}</th>' for text in head)
+    return (f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(label)}"><table id="{name}">'
+            f'<thead><tr>{cells}</tr></thead><tbody>{body}</tbody></table></div>')
+
+
+def _word(value: int | None) -> str:
+    return "" if value is None else f"{value:04X} ({_number(value - (value >> 15 << 16))})"
+
+
+def _process(report: dict[str, Any]) -> str:
+    """16-bit values and functions, where there are any; then log, history and storage."""
+    out = []
+    if report["analog"]:
+        rows = [[escape(row["address"]), escape(row["name"] or ""), escape(row["kind"]), row["direction"],
+                 str(row["channel"]), _value(report, f"analog.{k}.value", _word),
+                 _valid(report, k, row), _value(report, f"analog.{k}.received", _word)]
+                for k, row in enumerate(report["analog"])]
+        head = ("Address", "Name", "Kind", "", "Channel", "Value", "Mark", "Received by the slave")
+        out.append(_section("16-bit values", _table("analog", "16-bit values", head, rows), "values"))
+    if report["functions"]:
+        rows = [[escape(row["function"]), _value(report, f"functions.{k}.at_ns", _ms),
+                 _value(report, f"functions.{k}.answered_ns", _ms),
+                 _value(report, f"functions.{k}.result", lambda x: x or "no answer"),
+                 escape(row["string"] or "")] for k, row in enumerate(report["functions"])]
+        head = ("Function", "Asked ms", "Answered ms", "Result", "String")
+        out.append(_section("Functions", _table("functions", "Functions", head, rows)))
+    lost = "".join(f'<p class="hint">{_value(report, key)} {what}</p>' for key, what in
+                   (("events_lost", "events were overwritten before they were read"),
+                    ("events_left_out", "later events are left out")) if report[key])
+    log = [[_number(row["t_us"] / 1e3, 3), escape(row["text"])] for row in report["events"][-_EVENT_ROWS:]]
+    safe = [(f"Safety view of {escape(row['address'])}", f"F-IN1 {int(row['f_in1'])}, F-IN2 {int(row['f_in2'])}")
+            for row in report["safety"]]
+    pairs = _pairs([*safe, ("History", "<br>".join(escape(line) for line in history_lines(report["history"]))),
+                    ("Storage", escape(storage_line(report["storage"])))])
+    table = _table("log", "Event log", ("ms", "Event"), log) if log else '<p class="none">No events.</p>'
+    out.append(_section("Event log of the master", table + lost + pairs, "log-section"))
+    return "".join(out)
+
+
+def _valid(report: dict[str, Any], k: int, row: dict[str, Any]) -> str:
+    mark = "" if row["valid"] is None else _value(report, f"analog.{k}.valid", lambda v: "valid" if v else "invalid")
+    return mark + ("" if row["transfer"] else " no transfer")
+
+
 def _flags(report: dict[str, Any]) -> str:
     out = []
     for name, on in report["state"]["flags"].items():
@@ -366,7 +414,8 @@ def of_run(report: dict[str, Any], trace: Trace, pulse_counts: dict[str, Any]) -
             + (f'<p class="error" role="alert">{escape(report["error"])}</p>' if report["error"] else ""))
     return _page(report["plant"]["name"], "run", report, trace, head, tiles,
                  first=_section("Checks", _checks(checks) + _flags(report), "checks"),
-                 slaves=_slaves(report["slaves"], trace, True), eyes=_eyes(pulse_counts), details=details)
+                 slaves=_slaves(report["slaves"], trace, True), more=_process(report), eyes=_eyes(pulse_counts),
+                 details=details)
 
 
 def of_capture(statistics: dict[str, Any], trace: Trace, collected: eye.Eye) -> str:
@@ -401,7 +450,7 @@ def of_capture(statistics: dict[str, Any], trace: Trace, collected: eye.Eye) -> 
 
 
 def _page(title: str, kind: str, report: dict[str, Any], trace: Trace, head: str, tiles: Sequence[str], *, first: str,
-          slaves: str, eyes: str, details: str) -> str:
+          slaves: str, eyes: str, details: str, more: str = "") -> str:
     folder = resources.files("asi") / "html"
     style, script, page = ((folder / name).read_text("utf-8") for name in ("page.css", "page.js", "page.html"))
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
@@ -416,7 +465,7 @@ def _page(title: str, kind: str, report: dict[str, Any], trace: Trace, head: str
         note=f'<p class="hint" id="left-out">{escape(note)}</p>' if note else "",
         histogram=_histogram(times.per_us),
         cycles=f'{_number(times.count)} cycles, from one DEXG of the lowest number to the next' if times.count else "",
-        slaves=slaves, eyes=eyes, events=_events(trace), details=details,
+        slaves=slaves, more=more, eyes=eyes, events=_events(trace), details=details,
         data=_json({"schema": SCHEMA, "kind": kind, "report": report, "timeline": trace.data()}))
 
 

@@ -20,6 +20,8 @@ from typing import Annotated, Any, Literal
 from pydantic import (BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, StrictBool, StrictInt, Tag,
                       ValidationError)
 
+from asi import combined
+from asi.status import LogEvent, Status
 from asi.telegram import address_name, index_name, parse_index
 
 SETTLE_NS = 1_000_000_000      # P_PWR_SETTLE of the product firmware: plants are written for it
@@ -56,19 +58,51 @@ class Codes:
         return self.id == 0xA
 
     @property
+    def kind(self) -> combined.Kind:
+        """What a slave with these codes exchanges beside its nibble."""
+        return combined.kind_of(self.io, self.id, self.id2)
+
+    @property
     def profile(self) -> str:
         return f"S-{self.io:X}.{self.id:X}.{self.id2:X}"
 
 
 @dataclass(frozen=True)
+class Options:
+    """What a slave does other than most (SL-010; asi_slave_options of tb/asi_tb.h)."""
+    write_ns: int = 15_000_000   # time of a memory write after ADRA or WID1
+    write_fails: bool = False
+    id1_locked: bool = False
+    old: bool = False
+    sel_at_zero: bool = False
+
+
+@dataclass(frozen=True)
+class Safety:
+    """A safety slave: its eight words, and the closed contacts as bits 0 and 1."""
+    table: tuple[int, ...] = combined.SAFETY_TABLE
+    closed: int = 3
+
+
+@dataclass(frozen=True)
 class Slave:
-    """One simulated slave; `inputs` is its input nibble at time 0."""
+    """One simulated slave; inputs, values, invalid, overflow: at time 0. Channels count from 0 here."""
     name: str
     index: int
     codes: Codes
     inputs: int = 0
     watchdog: bool = False
     present: bool = True
+    values: tuple[int, ...] = ()                             # input words by channel, 0..FFFF
+    invalid: int = 0                                         # bit per channel: sends V = 0
+    overflow: int = 0                                        # bit per channel: sends O = 1
+    strings: dict[int, bytes] = field(default_factory=dict)  # S-7.4: 0 ID, 1 diagnosis, 2 parameters; CTT2: objects
+    safety: Safety | None = None
+    options: Options = Options()
+
+    @property
+    def kind(self) -> combined.Kind:
+        return self.codes.kind
 
     @property
     def address(self) -> str:
@@ -97,16 +131,44 @@ class Action:
     drop, connect, quiet            None
     noise      positions            Faults
     periphery_fault, periphery_ok   None
+    value      positions            (channel, word): input word of a combined transaction
+    invalid, overflow  positions    bit per channel: sends V = 0, O = 1
+    contacts   positions            closed contacts of a safety slave, bits 0 and 1
     power_off, power_on             None: line and slaves lose power; comes back
     apf_low, apf_high               None: only the master sees low voltage
     output     ()                   (index, nibble), host level
     mode       ()                   True: protected
     offline, data_exchange, auto_address  bool
+    analog     ()                   (index, channel, word): AODI
+    function   ()                   position in Plant.functions
     """
     time_ns: int
     do: str
     slaves: tuple[int, ...] = ()
     value: Any = None
+
+
+@dataclass(frozen=True)
+class Function:
+    """An execution control function that the host asks for at time_ns, and what it must end with (FN-001 ..)."""
+    time_ns: int
+    name: str                   # as in the file, e.g. change_address
+    code: int
+    first: int                  # FN_ARG
+    second: int
+    string: bytes
+    status: int                 # expected asi_status_t
+    data: int | None            # expected answer nibble; None: not looked at
+    answer: bytes | None        # expected string; None: not looked at
+    text: str                   # for people
+
+
+@dataclass(frozen=True)
+class Logged:
+    """An event that must be in the event log; None: any."""
+    event: int                  # LogEvent
+    index: int | None = None
+    data: int | None = None
 
 
 @dataclass(frozen=True)
@@ -119,6 +181,7 @@ class Host:
     data_exchange: bool = True
     auto_address: bool = False
     names: dict[int, str] = field(default_factory=dict)       # of slaves that are projected only
+    analog: dict[int, tuple[int, ...]] = field(default_factory=dict)  # AODI words by channel at time 0
 
 
 @dataclass(frozen=True)
@@ -131,6 +194,12 @@ class Check:
     flags: dict[str, bool] = field(default_factory=dict)
     inputs: dict[int, int] = field(default_factory=dict)
     cycle_max_ns: int | None = None
+    lpf: frozenset[int] | None = None
+    suspects: frozenset[int] | None = None
+    parameters: dict[int, int] = field(default_factory=dict)                  # PI
+    analog: dict[int, tuple[int | str, ...]] = field(default_factory=dict)    # AIDI: word, "invalid" or "any"
+    received: dict[int, tuple[int | str, ...]] = field(default_factory=dict)  # by position: words the slave has got
+    log: tuple[Logged, ...] = ()                                              # so far, in this order
 
 
 @dataclass(frozen=True)
@@ -146,6 +215,8 @@ class Plant:
     checks: tuple[Check, ...]
     sources: tuple[tuple["Action", int, int], ...]  # first action, period (0: once), last time
     shift_ns: int = 0
+    functions: tuple[Function, ...] = ()     # in the order of the file
+    lettered: frozenset[int] = frozenset()   # numbers that functions name with A or B
 
     def iter_actions(self) -> Iterator[Action]:
         """Every timed action, sorted by time (equal times: order of the file); endless when something repeats."""
@@ -176,14 +247,15 @@ class Plant:
     def _extended_numbers(self) -> frozenset[int]:
         indices = [s.index for s in self.slaves if s.codes.extended and s.index]
         indices += [index for index, codes in self.host.pcd.items() if codes.extended]
-        return frozenset(index & 31 for index in indices)
+        return frozenset(index & 31 for index in indices) | self.lettered
 
     def with_settle(self, settle_ns: int) -> "Plant":
         """The same plant for a firmware image that waits settle_ns instead of SETTLE_NS: every time moves with it."""
         shift = settle_ns - SETTLE_NS
         move = lambda time_ns: max(0, time_ns + shift)  # noqa: E731 - what happened before the start happens at 0
         return replace(self, shift_ns=self.shift_ns + shift, duration_ns=move(self.duration_ns),
-                       checks=tuple(replace(c, time_ns=move(c.time_ns)) for c in self.checks))
+                       checks=tuple(replace(c, time_ns=move(c.time_ns)) for c in self.checks),
+                       functions=tuple(replace(f, time_ns=move(f.time_ns)) for f in self.functions))
 
 
 # ---------------------------------------------------------------- values
@@ -232,6 +304,24 @@ def parse_addresses(value: Any) -> frozenset[int]:
     return frozenset(out)
 
 
+def parse_bytes(text: Any) -> bytes:
+    """'10 22 0A' -> bytes; ValueError otherwise."""
+    if isinstance(text, str) and re.fullmatch(r"\s*([0-9A-Fa-f]{2}\s*)+", text):
+        data = bytes.fromhex(text)
+        if len(data) > combined.STRING_BYTES:
+            raise ValueError(f"{len(data)} bytes, at most {combined.STRING_BYTES}")
+        return data
+    raise ValueError(f"{_show(text)} is not a string of bytes: pairs of hexadecimal digits, in quotes")
+
+
+def parse_numbers(value: Any, highest: int) -> int:
+    """[1, 3] -> 0b101: numbers 1..highest as bits from bit 0; ValueError otherwise."""
+    numbers = value if isinstance(value, list) else None
+    if numbers is None or any(isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= highest for n in numbers):
+        raise ValueError(f"{_show(value)} is not a list of numbers 1 to {highest}")
+    return sum(1 << n - 1 for n in set(numbers))
+
+
 def _show(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 40 else text[:37] + "..."
@@ -268,12 +358,52 @@ def _period(value: Any) -> int:
     return period
 
 
+def _word(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not -0x8000 <= value <= 0xFFFF:
+        raise ValueError(f"{_show(value)} is not a 16-bit value, -32768 to 65535")
+    return value & 0xFFFF
+
+
+def _wanted_word(value: Any) -> int | str:
+    if value in ("invalid", "any"):
+        return value
+    try:
+        return _word(value)
+    except ValueError:
+        raise ValueError(f"{_show(value)} is not a 16-bit value, 'invalid' or 'any'") from None
+
+
+def _status(value: Any) -> int:
+    if not isinstance(value, str) or value not in Status.__members__:
+        raise ValueError(f"{_show(value)} is not 'OK' or an error: {', '.join(list(Status.__members__)[1:])}")
+    return int(Status[value])
+
+
+def _event_name(value: Any) -> int:
+    if not isinstance(value, str) or value.upper() not in LogEvent.__members__ or value != value.lower():
+        raise ValueError(f"{_show(value)} is not an event: {', '.join(name.lower() for name in LogEvent.__members__)}")
+    return int(LogEvent[value.upper()])
+
+
+def _index(value: Any) -> int:
+    return parse_index(_text(value, "address"))
+
+
+def _contacts(value: Any) -> int:
+    return parse_numbers(value, 2)
+
+
 Time = Annotated[int, BeforeValidator(parse_time)]
 SignedTime = Annotated[int, BeforeValidator(_signed_time)]
 Period = Annotated[int, BeforeValidator(_period)]
 Nibble = Annotated[int, BeforeValidator(parse_nibble)]
 Address = Annotated[str, BeforeValidator(_address)]
 Addresses = Annotated[frozenset[int], BeforeValidator(parse_addresses)]
+Bytes = Annotated[bytes, BeforeValidator(parse_bytes)]
+Word = Annotated[int, BeforeValidator(_word)]
+WantedWord = Annotated[Any, BeforeValidator(_wanted_word)]
+Contacts = Annotated[int, BeforeValidator(_contacts)]
+Index = Annotated[int, BeforeValidator(_index)]
 Probability = Annotated[int, BeforeValidator(_probability)]
 Name = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f\x7f]+$")]
 
@@ -292,6 +422,20 @@ _Inputs = Annotated[Annotated[Nibble, Tag("(nibble)")] | Annotated[list[_Step], 
                     Discriminator(lambda value: "(steps)" if isinstance(value, list) else "(nibble)")]
 
 
+class _WordStep(_Table):
+    at: Time
+    value: Word
+
+
+_Channel = Annotated[Annotated[Word, Tag("(word)")] | Annotated[list[_WordStep], Tag("(steps)")],
+                     Discriminator(lambda value: "(steps)" if isinstance(value, list) else "(word)")]
+
+
+class _Safety(_Table):
+    table: Annotated[list[Nibble], Field(min_length=8, max_length=8)] = list(combined.SAFETY_TABLE)
+    closed: Contacts = 3
+
+
 class _Codes(_Table):
     profile: str | None = None
     io: Nibble | None = None
@@ -307,6 +451,16 @@ class _Slave(_Codes):
     repeat: Period | None = None
     watchdog: StrictBool = False
     present: StrictBool = True
+    values: list[_Channel] | None = None
+    invalid: Any = None
+    overflow: Any = None
+    strings: dict[str, Bytes] | None = None
+    safety: _Safety | None = None
+    write_time: Time = Options.write_ns
+    write_fails: StrictBool = False
+    id1_locked: StrictBool = False
+    old: StrictBool = False
+    sel_at_zero: StrictBool = False
 
 
 class _Extra(_Codes):
@@ -321,6 +475,27 @@ class _Output(_Table):
     repeat: Period | None = None
 
 
+class _Analog(_Table):
+    address: Address
+    values: list[_Channel]
+    repeat: Period | None = None
+
+
+class _Function(_Codes):
+    at: Time
+    do: Literal["set_permanent_parameter", "write_parameter", "store_parameters", "set_permanent_configuration",
+                "store_configuration", "set_lps", "change_address", "execute", "write_id1", "read_parameter_string",
+                "write_parameter_string", "read_diagnosis_string", "read_id_string", "message", "set_auto_clear"]
+    address: Address | None = None
+    new: Address | None = None
+    addresses: Addresses | None = None
+    value: Any = None
+    string: Bytes | None = None
+    result: Annotated[int, BeforeValidator(_status)] = 0
+    data: Nibble | None = None
+    answer: Bytes | None = None
+
+
 class _Host(_Table):
     mode: Literal["configuration", "protected"] = "configuration"
     projected: Annotated[Any, BeforeValidator(_projected)] = "all"
@@ -329,13 +504,17 @@ class _Host(_Table):
     parameters: dict[str, Nibble] = {}
     data_exchange: StrictBool = True
     auto_address: StrictBool = False
+    auto_clear: Annotated[StrictInt, Field(ge=0, le=3)] = 0
     output: list[_Output] = []
+    analog: list[_Analog] = []
+    function: list[_Function] = []
 
 
 class _Event(_Table):
     at: Time
     do: Literal["drop", "connect", "noise", "quiet", "inputs", "periphery_fault", "periphery_ok", "power_off",
-                "power_on", "apf_low", "apf_high", "mode", "offline", "data_exchange", "auto_address"]
+                "power_on", "apf_low", "apf_high", "mode", "offline", "data_exchange", "auto_address", "replace",
+                "invalid", "overflow", "contacts"]
     slave: str | None = None
     value: Any = None
     repeat: Period | None = None
@@ -349,6 +528,12 @@ class _Event(_Table):
     delay: Time | None = None
 
 
+class _Logged(_Table):
+    event: Annotated[int, BeforeValidator(_event_name)]
+    address: Index | None = None
+    data: Annotated[StrictInt, Field(ge=0, le=0xFFFF)] | None = None
+
+
 class _Expect(_Table):
     lds: Addresses | None = None
     las: Addresses | None = None
@@ -356,6 +541,12 @@ class _Expect(_Table):
     flags: dict[Literal[WATCHED_FLAGS], StrictBool] = {}
     inputs: dict[str, Nibble] = {}
     cycle_max: Time | None = None
+    lpf: Addresses | None = None
+    suspects: Addresses | None = None
+    parameters: dict[str, Nibble] = {}
+    analog: dict[str, list[WantedWord]] = {}
+    received: dict[str, list[WantedWord]] = {}
+    log: list[_Logged] = []
 
 
 class _Check(_Expect):
@@ -382,7 +573,19 @@ class _Fault(ValueError):
         self.key = key
 
 
-_SLAVE_EVENTS = ("drop", "connect", "noise", "quiet", "inputs", "periphery_fault", "periphery_ok")
+_SLAVE_EVENTS = ("drop", "connect", "noise", "quiet", "inputs", "periphery_fault", "periphery_ok", "replace",
+                 "invalid", "overflow", "contacts")
+# functions: number, and the keys that each needs
+_FUNCTIONS = {
+    "set_permanent_parameter": (3, ("address", "value")), "write_parameter": (5, ("address", "value")),
+    "store_parameters": (7, ()), "set_permanent_configuration": (8, ("address",)), "store_configuration": (10, ()),
+    "set_lps": (12, ("addresses",)), "change_address": (20, ("address", "new")), "execute": (22, ("address", "value")),
+    "write_id1": (24, ("value",)), "read_parameter_string": (27, ("address",)),
+    "write_parameter_string": (28, ("address", "string")), "read_diagnosis_string": (29, ("address",)),
+    "read_id_string": (30, ("address",)), "message": (31, ("address", "string")), "set_auto_clear": (33, ("value",)),
+}
+_ARGUMENTS = ("address", "new", "addresses", "value", "string")
+_CODE_KEYS = ("profile", "io", "id", "id1", "id2")
 _SWITCHES = ("offline", "data_exchange", "auto_address")
 _FAULT_KEYS = ("no_answer", "parity", "missing_pulse", "shifted_pulse", "extra_pulse")
 
@@ -431,6 +634,8 @@ class _Builder:
         self.sources: list[tuple[Action, int, int]] = []
         self.slaves: list[Slave] = []
         self.by_name: dict[str, int] = {}
+        self.functions: list[Function] = []
+        self.lettered: set[int] = set()
 
     def guard(self, prefix: str, work: Callable[[], Any]) -> Any:
         """work() with its fault written down; None then."""
@@ -455,10 +660,12 @@ class _Builder:
             raise _Fault("name", f"'{name}' would be mixed up with an address")
         position = len(self.slaves)
         steps = table.inputs if isinstance(table.inputs, list) else None
+        values = table.values or []
         if steps is not None:
             _steps(steps, table.repeat, "inputs")
-        elif table.repeat is not None:
-            raise _Fault("repeat", "inputs is not a list of steps")
+        elif table.repeat is not None and not any(isinstance(value, list) for value in values):
+            raise _Fault("repeat", "neither inputs nor one of values is a list of steps")
+        known = self.extras(table, codes)
         if not self.file.conflicts and table.present:
             for other in self.slaves:
                 if other.present and other.index == index:
@@ -468,15 +675,87 @@ class _Builder:
                     raise _Fault("address", f"'{other.name}' has the same number (conflicts = true allows that)")
         self.by_name[name] = position
         first = table.inputs if steps is None else steps[0].value if steps[0].at == 0 else 0
-        self.slaves.append(Slave(name, index, codes, first, table.watchdog, table.present))
+        self.slaves.append(Slave(name, index, codes, first, table.watchdog, table.present, **known,
+                                 values=self.channels(values, table.repeat, "value", (position,), ())))
         if steps is not None:
             self.series(steps, table.repeat, "inputs", (position,), lambda nibble: nibble)
+
+    def extras(self, table: _Slave, codes: Codes) -> dict[str, Any]:
+        """What a slave has beside inputs and values, as arguments of Slave."""
+        kind, out = codes.kind, {}
+        if table.values is not None and (kind.group or not kind.inputs):
+            hint = ": give each member its inputs" if kind.group else ""
+            raise _Fault("values", f"{codes.profile} has no 16-bit inputs{hint}")
+        if table.values is not None and len(table.values) > kind.inputs:
+            raise _Fault("values", f"{len(table.values)} channels, {codes.profile} has {kind.inputs}")
+        for key in ("invalid", "overflow"):
+            if (given := getattr(table, key)) is not None:
+                out[key] = _with_key(key, lambda g=given: self.mask(codes, g))
+        if table.strings is not None:
+            out["strings"] = {}
+            for text, data in table.strings.items():
+                number = self.string_number(kind, text)
+                if number is None:
+                    raise _Fault(f"strings.{_show(text)}", f"{codes.profile} has no such string")
+                out["strings"][number] = data
+        if kind.safety:
+            safety = table.safety or _Safety()
+            out["safety"] = Safety(tuple(safety.table), safety.closed)
+        elif table.safety is not None:
+            raise _Fault("safety", f"{codes.profile} is no safety slave (ID code B)")
+        if table.old and (codes.extended or (codes.id1, codes.id2) != (15, 15)):
+            raise _Fault("old", "a slave without ID1 and ID2 is no A/B slave and reads as F, F")
+        if table.write_time > 10**9:
+            raise _Fault("write_time", "longer than 1s")
+        out["options"] = Options(table.write_time, table.write_fails, table.id1_locked, table.old, table.sel_at_zero)
+        return out
+
+    def mask(self, codes: Codes, value: Any) -> int:
+        """Channels of an input slave with V and O bits (CTT1) -> bits."""
+        if codes.kind.name != "CTT1" or not codes.kind.inputs:
+            raise ValueError(f"{codes.profile} sends no valid and overflow bits")
+        return parse_numbers(value, codes.kind.inputs)
+
+    def string_number(self, kind: combined.Kind, text: str) -> int | None:
+        """Number of a slave's string in tb/asi_tb.h; None: it has no such string."""
+        if kind.messages:
+            if re.fullmatch(r"[1-9][0-9]{0,2}", text) and int(text) < 256:
+                return int(text)
+            return 0 if text == "id" else None
+        return combined.S74_STRINGS.get(text) if kind.strings else None
+
+    def channels(self, values: list, repeat: int | None, do: str, slaves: tuple[int, ...],
+                 before: tuple[int, ...]) -> tuple[int, ...]:
+        """Words per channel at time 0; lists of steps become actions with the value (*before, channel, word)."""
+        out = []
+        for channel, value in enumerate(values):
+            if isinstance(value, list):
+                _steps(value, repeat, f"values #{channel + 1}")
+                self.series(value, repeat, do, slaves, lambda word, c=channel: (*before, c, word))
+                value = value[0].value if value[0].at == 0 else 0
+            out.append(value)
+        return tuple(out)
+
+    def replacement(self, table: _Event) -> None:
+        """The slave that a `replace` event will bring: same profile and inputs, address 0."""
+        old = self.find(table.slave)
+        if len(old) != 1:
+            raise _Fault("slave", "'all' cannot be replaced")
+        slave = self.slaves[old[0]]
+        name = f"{slave.name} (new)"
+        if name in self.by_name:
+            raise _Fault("slave", f"'{slave.name}' is replaced twice, or '{name}' is a slave: replace '{name}'")
+        codes = slave.codes
+        if codes.extended:
+            codes = replace(codes, id1=codes.id1 & 7)  # leaves the factory as an A slave
+        self.by_name[name] = len(self.slaves)
+        self.slaves.append(replace(slave, name=name, index=0, present=False, codes=codes))
 
     def find(self, text: str | None) -> tuple[int, ...]:
         if text is None:
             raise _Fault("slave", "missing: a name, an address or 'all'")
-        if text == "all":
-            return tuple(range(len(self.slaves)))
+        if text == "all":  # those of the file: a replacement comes by its event
+            return tuple(range(len(self.file.slave)))
         if text in self.by_name:
             return (self.by_name[text],)
         if not _is_address(text):
@@ -508,6 +787,12 @@ class _Builder:
                 if abs(getattr(table, key)) > 1_000_000:
                     raise _Fault(key, "longer than 1ms")
             value = Faults(**faults, shift_ns=table.shift or 0, delay_ns=table.delay or 0)
+        elif table.do in ("invalid", "overflow"):
+            value = {_with_key("value", lambda k=k: self.mask(self.slaves[k].codes, table.value)) for k in slaves}.pop()
+        elif table.do == "contacts":
+            if any(self.slaves[k].safety is None for k in slaves):
+                raise _Fault("slave", "not a safety slave (ID code B)")
+            value = _with_key("value", lambda: parse_numbers(table.value, 2))
         elif table.do == "inputs":
             value = _with_key("value", lambda: parse_nibble(table.value))
         elif table.do == "mode":
@@ -520,6 +805,13 @@ class _Builder:
             value = table.value
         if value is None and table.value is not None:
             raise _Fault("value", f"'{table.do}' takes no value")
+        if table.do == "replace":
+            if table.repeat is not None:
+                raise _Fault("repeat", "a slave is replaced once")
+            new = self.by_name[f"{self.slaves[slaves[0]].name} (new)"]
+            for do, position in (("drop", slaves[0]), ("connect", new)):
+                self.sources.append((Action(table.at, do, (position,)), 0, LONGEST_NS))
+            return
         if table.until is not None and (table.repeat is None or table.until < table.at):
             raise _Fault("until", "needs repeat" if table.repeat is None else "before at")
         last = LONGEST_NS if table.until is None else table.until
@@ -570,23 +862,126 @@ class _Builder:
             if table.values and table.values[0].at == 0:
                 outputs[index] = table.values[0].value
             self.series(table.values, table.repeat, "output", (), lambda nibble, i=index: (i, nibble))
+        analog = {}
+        for number, table in enumerate(host.analog, 1):
+            key, index = f"host.analog #{number}", parse_index(table.address)
+            analog[index] = self.guard(key, lambda t=table: self.analog(t, pcd))
+        if host.auto_clear:
+            if host.auto_address or host.mode != "protected":
+                raise _Fault("auto_clear", "goes with neither automatic addressing nor configuration mode")
+            self.ask(Function(0, "set_auto_clear", 33, host.auto_clear, 0, b"", 0, None, None,
+                              f"set_auto_clear {host.auto_clear}"))
+        for number, table in enumerate(host.function, 1):
+            self.guard(f"host.function #{number}", lambda t=table: self.function(t))
         return Host(host.mode == "protected", pcd, parameters, outputs, host.data_exchange, host.auto_address,
-                    names)
+                    names, analog)
+
+    def analog(self, table: _Analog, pcd: dict[int, Codes]) -> tuple[int, ...]:
+        index = parse_index(table.address)
+        kinds = [codes.kind for codes in ([pcd[index]] if index in pcd else
+                                          [s.codes for s in self.slaves if s.index == index])]
+        if not kinds:
+            raise _Fault("address", f"no slave of this plant has address {table.address}")
+        if not kinds[0].outputs:
+            raise _Fault("address", f"the slave at {table.address} has no 16-bit outputs")
+        if len(table.values) > kinds[0].outputs:
+            raise _Fault("values", f"{len(table.values)} channels, the slave has {kinds[0].outputs}")
+        if table.repeat is not None and not any(isinstance(value, list) for value in table.values):
+            raise _Fault("repeat", "values has no list of steps")
+        return self.channels(table.values, table.repeat, "analog", (), (index,))
+
+    def ask(self, function: Function) -> None:
+        self.sources.append((Action(function.time_ns, "function", (), len(self.functions)), 0, LONGEST_NS))
+        self.functions.append(function)
+
+    def function(self, table: _Function) -> None:
+        """One [[host.function]]; its text says what people call it."""
+        code, needed = _FUNCTIONS[table.do]
+        if table.do == "set_permanent_configuration":
+            needed += _CODE_KEYS
+        for key in (*_ARGUMENTS, *_CODE_KEYS):
+            given = getattr(table, key) is not None
+            if key in needed and not given and key not in _CODE_KEYS:
+                raise _Fault(key, "missing")
+            if given and key not in needed:
+                raise _Fault(key, f"'{table.do}' takes no {key}")
+        if table.answer is not None and table.do not in ("read_parameter_string", "read_diagnosis_string",
+                                                         "read_id_string", "message"):
+            raise _Fault("answer", f"'{table.do}' answers with no string")
+        if table.data is not None and table.do not in ("write_parameter", "execute"):
+            raise _Fault("data", f"'{table.do}' answers with no nibble")
+        first, second = (parse_index(address) if address else 0 for address in (table.address, table.new))
+        words = [table.do, *(a for a in (table.address, table.new) if a)]
+        for address in (table.address, table.new):
+            if address and address[-1] in "AB":
+                self.lettered.add(parse_index(address) & 31)
+        if table.do == "set_auto_clear":
+            if isinstance(table.value, bool) or table.value not in (0, 1, 2, 3):
+                raise _Fault("value", f"{_show(table.value)} is not a number 0 to 3")
+            first = table.value
+            words.append(str(first))
+        elif table.do == "execute":
+            if not isinstance(table.value, str) or not re.fullmatch("[01]{5}", table.value):
+                raise _Fault("value", f"{_show(table.value)} is not five binary digits I4..I0, in quotes")
+            first, second = first & 31, int(table.value, 2)
+            words.append(table.value)
+        elif "value" in needed:
+            nibble = _with_key("value", lambda: parse_nibble(table.value))
+            first, second = (nibble, 0) if table.do == "write_id1" else (first, nibble)
+            words.append(f"{nibble:04b}")
+        elif table.do == "set_lps":
+            bits = sum(1 << index for index in table.addresses)
+            first, second = bits & 0xFFFF_FFFF, bits >> 32
+            words.append(" ".join(map(index_name, sorted(table.addresses))))
+        elif table.do == "set_permanent_configuration":
+            codes = _codes(table, first)
+            second = codes.word
+            words.append(f"{codes.profile} ID1 {codes.id1:X}")
+        if table.string is not None:
+            words.append(table.string.hex(" "))
+        self.ask(Function(table.at, table.do, code, first, second, table.string or b"", table.result, table.data,
+                          table.answer, " ".join(words)))
 
     def check(self, table: _Expect, time_ns: int) -> Check:
-        inputs = {_with_key(f"inputs.{_show(text)}", lambda t=text: parse_index(t)): nibble
-                  for text, nibble in table.inputs.items()}
         if time_ns > self.file.duration:
             raise _Fault("at", "after the end of the plant (duration)")
         if table.model_fields_set <= {"at"}:
             raise _Fault("", "empty: nothing to check")
-        return Check(time_ns, table.lds, table.las, table.lps, dict(table.flags), inputs, table.cycle_max)
+        inputs, parameters, analog = ({self.key(name, text): value for text, value in getattr(table, name).items()}
+                                      for name in ("inputs", "parameters", "analog"))
+        for index, words in analog.items():
+            _with_key(f"analog.'{index_name(index)}'", lambda i=index, w=words: combined.word_at(i, len(w) - 1))
+        received = {}
+        for text, words in table.received.items():
+            found = self.guard_key(f"received.{_show(text)}", lambda t=text: self.find(t))
+            if len(found) != 1 or not words or "invalid" in words or len(words) > self.slaves[found[0]].kind.heard:
+                raise _Fault(f"received.{_show(text)}", "not one slave with that many outputs of a combined transaction")
+            received[found[0]] = tuple(words)
+        return Check(time_ns, table.lds, table.las, table.lps, dict(table.flags), inputs, table.cycle_max, table.lpf,
+                     table.suspects, parameters, {i: tuple(w) for i, w in analog.items()}, received,
+                     tuple(Logged(one.event, one.address, one.data) for one in table.log))
+
+    def key(self, name: str, text: str) -> int:
+        """An address that is a key of the table `name` -> index."""
+        return _with_key(f"{name}.{_show(text)}", lambda: parse_index(text))
+
+    def guard_key(self, key: str, work: Callable[[], Any]) -> Any:
+        """work() whose fault belongs to this key."""
+        try:
+            return work()
+        except _Fault as fault:
+            raise _Fault(key, str(fault)) from None
 
     def plant(self) -> Plant:
         file = self.file
         for number, table in enumerate(file.slave, 1):
             self.guard(_item("slave", number, table.name), lambda t=table: self.slave(t))
         if self.lines:  # the rest would only repeat these
+            raise PlantError(self.lines)
+        for number, table in enumerate(file.event, 1):
+            if table.do == "replace":  # first: other events may be about the new slaves
+                self.guard(f"event #{number}", lambda t=table: self.replacement(t))
+        if self.lines:
             raise PlantError(self.lines)
         for number, table in enumerate(file.event, 1):
             self.guard(f"event #{number}", lambda t=table: self.event(t))
@@ -597,7 +992,8 @@ class _Builder:
         if self.lines:
             raise PlantError(self.lines)
         return Plant(self.path, file.name, file.description.strip(), file.duration, file.seed, host,
-                     tuple(self.slaves), tuple(sorted(checks, key=lambda c: c.time_ns)), tuple(self.sources))
+                     tuple(self.slaves), tuple(sorted(checks, key=lambda c: c.time_ns)), tuple(self.sources),
+                     functions=tuple(self.functions), lettered=frozenset(self.lettered))
 
 
 def _is_address(text: str) -> bool:

@@ -2,6 +2,7 @@
 """The report of a run: one plain dict (docs/report.md), written as JSON and shown on the terminal from that dict."""
 import json
 from pathlib import Path
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, Group
@@ -9,17 +10,20 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from asi.plant import Check
+from asi.combined import cyclic_words
+from asi.plant import Check, Codes, Function
 from asi.regmap import Phase
+from asi.status import Status, name_of
 from asi.telegram import line_order
 from asi.telegram_log import Counts, Tally
-from asi.window import INDICES, WindowError
+from asi.window import INDICES, Event, WindowError
 
 if TYPE_CHECKING:
     from asi.run import Runner
 
 SCHEMA = "asi-report 1"
 LISTS = ("lds", "las", "lps", "lpf")
+EVENTS_SHOWN = 20            # of the event log, on the terminal
 
 
 def check_result(check: Check, differences: list[str] | None, final: bool) -> dict[str, Any]:
@@ -29,15 +33,32 @@ def check_result(check: Check, differences: list[str] | None, final: bool) -> di
             "differences": differences or []}
 
 
+def function_result(function: Function, differences: list[str] | None) -> dict[str, Any]:
+    """The same of a function; None: it was not answered before the run ended early."""
+    result = "not reached" if differences is None else "not met" if differences else "met"
+    return {"name": "function", "at_ns": function.time_ns, "result": result, "differences": differences or []}
+
+
+def event_text(event: Event, name_of_index: Callable[[int], str]) -> str:
+    """'addressed 3: from 0: OK'."""
+    who = f" {name_of_index(event.index)}" if event.about_slave else ""
+    detail = event.detail(name_of_index)
+    return f"{event.name.replace('_', ' ')}{who}{': ' if detail else ''}{detail}"
+
+
 def build(runner: "Runner", counts: Counts, *, wall_s: float, interrupted: bool, error: str | None) -> dict[str, Any]:
     """Read the chip once more and put everything together."""
     plant, bench, window = runner.plant, runner.bench, runner.window
     bus_ns = bench.time()  # before the reads below, which take bus time themselves
     state, outputs, detected = window.state(), window.outputs(), window.detected_codes()
+    inputs, analog, history = None, [], None
     try:
         inputs = window.inputs()
+        analog = _analog(runner, state, detected)
+        history = window.history()
     except WindowError as fault:
-        inputs, error = None, error or str(fault)
+        error = error or str(fault)
+    storage, safe = window.storage(), window.safety()
     stats, checks = bench.stats(), runner.results()
     failed = any(check["result"] == "not met" for check in checks)
     result = ("failed" if error else "interrupted" if interrupted else "expectation not met" if failed else "ok")
@@ -76,7 +97,58 @@ def build(runner: "Runner", counts: Counts, *, wall_s: float, interrupted: bool,
         },
         "phases_ns": {phase.name: stats.phase_ns[phase] for phase in Phase},
         "checks": checks,
+        "analog": analog,
+        "safety": [{"address": plant.name_of(slave.index), "name": slave.name, "f_in1": slave.index in safe[0],
+                    "f_in2": slave.index in safe[1]} for slave in plant.slaves if slave.safety and slave.index],
+        "functions": [_function(function, runner.answers.get(k)) for k, function in enumerate(plant.functions)],
+        "events": [{"t_us": event.time_us, "event": event.name, "data": event.data,
+                    "address": plant.name_of(event.index) if event.about_slave else None,
+                    "text": event_text(event, plant.name_of)} for event in runner.events],
+        "events_lost": runner.events_lost, "events_left_out": runner.events_left_out,
+        "history": {
+            "changed": _names(plant, history and history.changed), "changed_us": history and history.changed_us,
+            "offline_causes": list(history.causes) if history else [],
+            "last_offline_cause": history and history.last_cause, "offline_us": history and history.offline_us,
+            "suspects": _names(plant, history and history.suspects),
+        },
+        "storage": vars(storage),
     }
+
+
+def _names(plant, indices: frozenset[int] | None) -> list[str]:
+    return [plant.name_of(index) for index in sorted(indices or (), key=line_order)]
+
+
+def _function(function: Function, done: tuple | None) -> dict[str, Any]:
+    answer, asked_ns, done_ns = done or (None, None, None)
+    return {"function": function.text, "at_ns": function.time_ns, "asked_ns": asked_ns, "answered_ns": done_ns,
+            "result": answer and answer.name, "expected": name_of(Status, function.status),
+            "data": answer and answer.data, "string": answer and answer.string.hex(" ")}
+
+
+def _analog(runner: "Runner", state, detected: dict[int, Codes]) -> list[dict[str, Any]]:
+    """One row per 16-bit value that the codes of a slave promise: the plant's, or those that were detected."""
+    plant, window, rows = runner.plant, runner.window, []
+    position = {slave.index: k for k, slave in reversed(list(enumerate(plant.slaves)))}
+    for index in sorted({*position, *detected} - {0}, key=line_order):
+        slave = plant.slaves[position[index]] if index in position else None
+        kind = (slave.codes if slave else detected[index]).kind
+        inputs, outputs = kind.inputs, kind.outputs
+        if kind.messages and (words := cyclic_words(slave.strings.get(0) if slave else None)):
+            inputs, outputs = min(inputs, words[0]), min(outputs, words[1])
+        received = runner.receives(position[index]) if slave else []
+        transfer = window.ctt_state(index) if inputs or outputs else None
+        for direction, count in (("in", inputs), ("out", outputs)):
+            for channel in range(count):
+                one = window.analog_input(index, channel) if direction == "in" else None
+                rows.append({
+                    "address": plant.name_of(index), "index": index, "name": slave and slave.name, "kind": kind.name,
+                    "direction": direction, "channel": channel + 1,
+                    "value": one.value if one else window.analog_output(index, channel),
+                    "valid": one and one.valid, "transparent": transfer.transparent, "transfer": transfer.tv,
+                    "received": received[channel] if not one and channel < len(received) else None,
+                })
+    return rows
 
 
 def _tally(tally: Tally) -> dict[str, int]:
@@ -193,6 +265,65 @@ def _slave_table(rows: list[dict[str, Any]]) -> Table:
     return table
 
 
+def word(value: int | None) -> str:
+    """0xFFFE -> 'FFFE -2'."""
+    return "-" if value is None else f"{value:04X} {value - (value >> 15 << 16)}"
+
+
+def _analog_table(rows: list[dict[str, Any]]) -> Table:
+    table = Table(box=None, header_style="bold", padding=(0, 1))
+    for name in ("addr", "16-bit values", "kind", "", "channel", "value", "mark", "received"):
+        table.add_column(name, justify="right" if name in ("addr", "value", "received") else "left")
+    for row in rows:
+        mark = ("" if row["valid"] is None else "valid" if row["valid"] else "invalid") + \
+            ("" if row["transfer"] else " no transfer")
+        table.add_row(row["address"], Text(row["name"] or "-"), row["kind"], row["direction"], str(row["channel"]),
+                      word(row["value"]), Text(mark.strip(), style="green" if mark == "valid" else "yellow"),
+                      "" if row["direction"] == "in" else word(row["received"]))
+    return table
+
+
+def _functions(rows: list[dict[str, Any]]) -> Text:
+    text = Text()
+    for number, row in enumerate(rows):
+        text.append(f"{chr(10) if number else ''}{row['function']} at {ms(row['at_ns'])}: ")
+        text.append(row["result"] or "no answer", style="green" if row["result"] == row["expected"] else "bold red")
+        if row["answered_ns"] is not None:
+            text.append(f" after {ms(row['answered_ns'] - row['asked_ns'])}")
+        if row["string"]:
+            text.append(f"\n  {row['string']}")
+    return text
+
+
+def _events(report: dict[str, Any]) -> Text:
+    rows, text = report["events"], Text()
+    if hidden := max(0, len(rows) - EVENTS_SHOWN):
+        text.append(f"... {hidden} before these\n", style="dim")
+    text.append("\n".join(f"{row['t_us'] / 1e3:.3f} ms  {row['text']}" for row in rows[hidden:]) or "none")
+    for key, what in (("events_left_out", "later ones left out"), ("events_lost", "lost: the reader was too slow")):
+        if report[key]:
+            text.append(f"\n{report[key]} {what}", style="yellow")
+    return text
+
+
+def history_lines(history: dict[str, Any]) -> list[str]:
+    """History in words, for the terminal and the page."""
+    out = []
+    if history["changed_us"] is not None:
+        out.append(f"Config_OK was lost at {history['changed_us'] / 1e3:.3f} ms: {' '.join(history['changed'])}")
+    if history["last_offline_cause"]:
+        out.append(f"offline because of {', '.join(history['offline_causes'])}; last {history['last_offline_cause']} "
+                   f"at {history['offline_us'] / 1e3:.3f} ms")
+    if history["suspects"]:
+        out.append(f"suspected duplicate addresses: {' '.join(history['suspects'])}")
+    return out or ["nothing to tell"]
+
+
+def storage_line(storage: dict[str, Any]) -> str:
+    marks = [name for name in ("busy", "failed", "saved") if storage[name]]
+    return ", ".join([storage["state"], *marks, f"set {storage['sequence']}"])
+
+
 def _checks(checks: list[dict[str, Any]]) -> Text:
     text = Text()
     styles = {"met": "green", "not met": "bold red", "not reached": "yellow"}
@@ -236,10 +367,19 @@ def render(report: dict[str, Any]) -> Group:
         ("start-up", f"first telegram at {ms(start['first_telegram_ns'])}, first cycle at "
                      f"{ms(start['first_cycle_ns'])}, {ms(start['start_up_ns'])} from one to the other"),
         ("phases", phases or "none"),
+        *([("functions", _functions(report["functions"]))] if report["functions"] else []),
+        *([("safety view", ", ".join(f"{row['address']} F-IN1={int(row['f_in1'])} F-IN2={int(row['f_in2'])}"
+                                     for row in report["safety"]))] if report["safety"] else []),
+        ("event log", _events(report)),
+        ("history", "\n".join(history_lines(report["history"]))),
+        ("storage", storage_line(report["storage"])),
         ("expected", _checks(report["checks"])),
     ])
     parts: list[Any] = [Panel(head, title=title, title_align="left", border_style=style),
-                        _slave_table(report["slaves"]), Text(""), foot]
+                        _slave_table(report["slaves"]), Text("")]
+    if report["analog"]:
+        parts += [_analog_table(report["analog"]), Text("")]
+    parts.append(foot)
     if report["error"]:
         parts.append(Text(f"error: {report['error']}", style="bold red"))
     return Group(*parts)
