@@ -193,7 +193,7 @@ static void whole(asi_ctt_t *c, unsigned index)
     }
     s->fails = 0u;
     asi_ctt_status_set(c, index, 0u, ASI_CTT_TV);
-    choose(c, index);
+    s->step = IDLE; /* the next message is chosen with the next call: both in one would be the longest call by far */
 }
 
 /* the slave has seen the last level of the request */
@@ -311,9 +311,10 @@ unsigned asi_ctt2_call(asi_ctt_t *c, unsigned index, const asi_ctt_call_t *call)
 {
     asi_ctt2_t *s = &c->slave[index].two;
     if (call->ok) {
+        const unsigned before = s->step;
         receive(c, index, call->answer);
         /* a late nibble shows the old level: nothing happened */
-        if (((call->sent ^ s->level) & DO_BOTH) == 0u) {
+        if (s->step == before && ((call->sent ^ s->level) & DO_BOTH) == 0u) {
             if (s->step == SEND)
                 advance(c, index, call->now_us);
             else if (s->step == IDLE || (s->step == GAP && ++s->quiet > ASI_CTT2_GAP_CALLS))
