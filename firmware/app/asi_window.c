@@ -137,7 +137,7 @@ static void show_state(asi_ec_t *ec)
         WINDOW(uint8_t, PECHO)[i] = s->pecho[i];
     }
     asi_ec_changes_taken(ec);
-    analog_numbers = ec->ctt.live.w[0] | ec->ctt.live.w[1] | ec->ctt.groups.w[0] | ec->ctt.groups.w[1];
+    analog_numbers = ec->ctt.live.w[0] | ec->ctt.live.w[1] | ec->ctt.groups;
     show_log(&ec->log);
 }
 

@@ -56,8 +56,8 @@ static void serve_storage(void)
 {
     asi_status_t result;
     asi_persist_serve();
-    if (!asi_persist_ended(&result))
-        return;
+    if (!asi_persist_ended(&result) || (asi_persist_word() & STORE_R__STATE_bm) == 0u)
+        return; /* without a flash the state says enough */
     hal_irq_off();
     asi_log_put(&ec.log, asi_port_time_us(), ASI_EVENT_STORED, 0u, (unsigned)-result);
     hal_irq_on();

@@ -146,7 +146,15 @@ typedef struct {
 /** Whether any slave is open: else images and calls are plain. */
 static inline bool asi_ctt_any(const asi_ctt_t *c)
 {
-    return (c->live.w[0] | c->live.w[1] | c->groups.w[0] | c->groups.w[1] | c->safety.w[0] | c->safety.w[1]) != 0u;
+    return (c->live.w[0] | c->live.w[1] | c->groups | c->safety) != 0u;
+}
+
+/** Whether a string to write is whole sequences of 3 bytes, n up to 255. The core cannot divide, and a loop that subtracts
+ * becomes a division in some compilers. */
+static inline bool asi_ctt_whole_sequences(unsigned n)
+{
+    n = (n & 3u) + (n >> 2 & 3u) + (n >> 4 & 3u) + (n >> 6 & 3u); /* 4 leaves 1 */
+    return (0x1249u >> n & 1u) != 0u; /* 0, 3, 6, 9, 12 */
 }
 
 /** Kind for these codes (IO 3..0, ID 7..4, ID1 11..8, ID2 15..12). */

@@ -221,13 +221,6 @@ static void string_out(asi_ctt_t *c, unsigned index, unsigned wanted)
     say(s, wanted);
 }
 
-/* up to 255. The core cannot divide, and a loop that subtracts becomes a division in some compilers */
-static bool multiple_of_3(unsigned n)
-{
-    n = (n & 3u) + (n >> 2 & 3u) + (n >> 4 & 3u) + (n >> 6 & 3u); /* 4 leaves 1 */
-    return (0x1249u >> n & 1u) != 0u; /* 0, 3, 6, 9, 12 */
-}
-
 bool asi_ctt1_hold(asi_ctt_t *c, unsigned index)
 {
     asi_ctt1_t *s = &c->slave[index].one;
@@ -252,7 +245,7 @@ asi_status_t asi_ctt1_string(asi_ctt_t *c, unsigned index, asi_string_kind_t kin
     if (kind == ASI_STRING_WRITE) {
         if (length > ASI_CTT1_STRING_BYTES)
             return ASI_E_OVERFLOW;
-        if (length == 0u || !multiple_of_3(length))
+        if (length == 0u || !asi_ctt_whole_sequences(length))
             return ASI_E_ARG;
         c->string.position = 0u;
         c->string.length = (uint16_t)length;

@@ -370,7 +370,7 @@ void asi_ec_exchange_done(asi_ec_t *ec)
 static void ctt_images(asi_ec_t *ec, uint32_t in[ASI_IMAGE_WORDS])
 {
     asi_list_t called = ASI_LIST_EMPTY, failed = ASI_LIST_EMPTY;
-    const asi_list_t groups = {{ec->ctt.groups.w[0] | ec->ctt.safety.w[0], ec->ctt.groups.w[1] | ec->ctt.safety.w[1]}};
+    const asi_list_t groups = {{ec->ctt.groups | ec->ctt.safety, 0u}};
     for (unsigned i = asi_list_next(&groups, 0u); i < ASI_INDICES; i = asi_list_next(&groups, i + 1u)) {
         const asi_slot_state_t slot = asi_port_slot_state(i);
         if (slot.calls == ec->calls[i])

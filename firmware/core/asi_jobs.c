@@ -72,6 +72,8 @@ static void finish(asi_ec_t *ec, asi_job_t *job, asi_status_t status)
     const asi_list_t nobody = ASI_LIST_EMPTY;
     job->status = status;
     job->waiting = false;
+    if (is_string(job->kind))
+        asi_ctt_release(&ec->ctt, job->index, asi_port_time_us());
     if (!asi_list_is_empty(&ec->held))
         ec_inclusion_hold(ec, &nobody);
     if (job->kind == ASI_JOB_AUTO_ADDRESS) {
@@ -506,8 +508,14 @@ static void advance(asi_ec_t *ec)
     if (!job || job->status != ASI_E_BUSY || job->step == STEP_STRING || job->waiting || ec->owner != ASI_OWNER_NONE ||
         ec->reactivate)
         return;
-    if (asi_port_time_us() - job->pause_from_us >= job->pause_us)
-        send_call(ec, job);
+    if (asi_port_time_us() - job->pause_from_us < job->pause_us)
+        return;
+    if (job->step == STEP_STRING_BEGIN && !asi_ctt_hold(&ec->ctt, job->index)) { /* the value under way first */
+        if (asi_port_time_us() - job->since_us >= ASI_CTT1_TIMEOUT_MS * 1000u)
+            finish(ec, job, ASI_E_TRANSFER);
+        return;
+    }
+    send_call(ec, job);
 }
 
 void ec_job_result(asi_ec_t *ec, const asi_result_t *result)
@@ -539,7 +547,7 @@ static void begin(asi_ec_t *ec, asi_job_t *job, asi_job_kind_t kind, unsigned in
     asi_list_t held = ASI_LIST_EMPTY;
     *job = (asi_job_t){.kind = (uint8_t)kind, .index = (uint8_t)index, .value = (uint8_t)value, .status = ASI_E_BUSY,
                        .codes = ec->state.cdi[index], .no_id2 = asi_list_has(&ec->no_id2, index),
-                       .id1 = id1, .id1_now = id1};
+                       .id1 = id1, .id1_now = id1, .since_us = asi_port_time_us()};
     if (step == STEP_DELETE || step == STEP_FIND) {
         asi_list_add(&held, 0u);
         asi_list_add(&held, index);
@@ -618,6 +626,8 @@ static asi_status_t check_arguments(const asi_ec_t *ec, asi_job_kind_t kind, uns
         good = is_string((unsigned)kind) && is_slave(index);
         if (good && kind == ASI_JOB_WRITE_PARAMETER_STRING && length > ASI_CTT1_STRING_BYTES)
             return ASI_E_OVERFLOW;
+        if (kind == ASI_JOB_WRITE_PARAMETER_STRING)
+            good = good && length != 0u && asi_ctt_whole_sequences(length);
         if (good && kind == ASI_JOB_MESSAGE && length > ASI_CTT2_MESSAGE_BYTES)
             return ASI_E_OVERFLOW;
         break;

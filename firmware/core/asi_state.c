@@ -166,6 +166,8 @@ void ec_send_outputs(asi_ec_t *ec)
 
 void ec_run_cycle(const asi_ec_t *ec)
 {
+    if (ec->reactivate)
+        return; /* it is being stopped (EX-024) */
     uint16_t min_cycle_us = ASI_MIN_CYCLE_US;
     if (asi_list_is_empty(&ec->state.las))
         min_cycle_us = ASI_EMPTY_CYCLE_US;

@@ -2,6 +2,8 @@
 /** @file fake_ctt.c  In place of the combined transactions: strings that begin and end as the test says (asi_ctt.h). */
 #include "asi_ctt.h"
 
+int fake_holds;       /* calls of asi_ctt_hold until it lets go */
+int fake_released;    /* calls of asi_ctt_release */
 int fake_refuse;      /* status of the next asi_ctt_string */
 unsigned fake_kind;   /* of the string begun last */
 static asi_ctt_t *line;
@@ -56,6 +58,8 @@ asi_status_t asi_ctt_string(asi_ctt_t *c, unsigned index, asi_string_kind_t kind
     fake_kind = kind;
     return ASI_OK;
 }
+bool asi_ctt_hold(asi_ctt_t *c, unsigned index) { (void)c; (void)index; return !fake_holds || --fake_holds == 0; }
+void asi_ctt_release(asi_ctt_t *c, unsigned index, uint32_t now_us) { (void)c; (void)index; (void)now_us; fake_released++; }
 /** The transfer ends with this status; so many bytes 0, 1, 2 ... were read. */
 void fake_end(int status, unsigned length)
 {
