@@ -7,25 +7,24 @@ _Static_assert(ASI_CTT2_MESSAGE_BYTES >= ASI_CTT1_STRING_BYTES, "strings and mes
 
 asi_ctt_kind_t asi_ctt_kind(uint16_t codes)
 {
-    static const struct { uint8_t profile, id2, kind; } kinds[] = { /* profile: IO, ID */
-        {0x75, 0x5, ASI_CTT_2},     {0x7A, 0x5, ASI_CTT_2},     {0xBA, 0x5, ASI_CTT_2}, {0x7A, 0x7, ASI_CTT_3_4IO},
-        {0x7A, 0xA, ASI_CTT_3_8IO}, {0x7A, 0x8, ASI_CTT_4},     {0x7A, 0x9, ASI_CTT_4},
-        /* a member says its place in the group: first = 8 + n, others 4 + those still to come */
-        {0x60, 0xA, ASI_CTT_5},     {0x60, 0xB, ASI_CTT_5},     {0x60, 0xC, ASI_CTT_5},
-        {0x60, 0x7, ASI_CTT_5},     {0x60, 0x6, ASI_CTT_5},     {0x60, 0x5, ASI_CTT_5},
-        {0x74, 0x0, ASI_CTT_NONE}, /* 4I/4O mode */
-    };
-    const unsigned id = (unsigned)codes >> 4 & 15u, id2 = (unsigned)codes >> 12;
-    const unsigned profile = (codes & 15u) << 4 | id;
-    if (id == 0xBu)
-        return ASI_CTT_SAFETY;
-    for (unsigned k = 0u; k < sizeof kinds / sizeof kinds[0]; k++) {
-        if (kinds[k].profile == profile && kinds[k].id2 == id2)
-            return (asi_ctt_kind_t)kinds[k].kind;
+    const unsigned id2 = (unsigned)codes >> 12;
+    switch (codes & 0xFFu) { /* ID, IO: a switch, because activation asks it of every slave */
+    case 0x17u: case 0x27u: case 0x37u:
+    case 0x47u:
+        if ((codes & 0xFFu) == 0x47u && id2 == 0u)
+            return ASI_CTT_NONE; /* 4I/4O mode */
+        return id2 & 8u ? ASI_CTT_1_IN : ASI_CTT_1_OUT;
+    case 0x57u:
+    case 0xABu: return id2 == 5u ? ASI_CTT_2 : ASI_CTT_NONE;
+    case 0xA7u:
+        return id2 == 5u   ? ASI_CTT_2
+               : id2 == 7u ? ASI_CTT_3_4IO
+               : id2 == 8u || id2 == 9u ? ASI_CTT_4
+               : id2 == 10u ? ASI_CTT_3_8IO : ASI_CTT_NONE;
+    case 0x06u: /* a member says its place in the group: first = 8 + n, others 4 + those still to come */
+        return (id2 >= 5u && id2 <= 7u) || (id2 >= 10u && id2 <= 12u) ? ASI_CTT_5 : ASI_CTT_NONE;
+    default: return (codes & 0xF0u) == 0xB0u ? ASI_CTT_SAFETY : ASI_CTT_NONE;
     }
-    if (profile < 0x71u || profile > 0x74u)
-        return ASI_CTT_NONE;
-    return (id2 & 8u) != 0u ? ASI_CTT_1_IN : ASI_CTT_1_OUT;
 }
 
 void asi_ctt_init(asi_ctt_t *c)

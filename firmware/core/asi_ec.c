@@ -419,7 +419,7 @@ asi_status_t asi_ec_slave_lost(asi_ec_t *ec, const asi_list_t *lost)
         return ASI_E_STATE;
     for (unsigned i = asi_list_next(&gone, 0u); i < ASI_INDICES; i = asi_list_next(&gone, i + 1u))
         ec_leave_lds(ec, i); /* EX-015; found again by inclusion */
-    if (ec->state.phase == ASI_PHASE_DATA_EXCHANGE && !ec->reactivate)
+    if (ec->state.phase == ASI_PHASE_DATA_EXCHANGE)
         ec_run_cycle(ec);
     ec_update_flags(ec);
     return ASI_OK;

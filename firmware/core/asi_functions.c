@@ -12,13 +12,13 @@ static bool is_slave(unsigned index)
 static void permanent_changed(asi_ec_t *ec)
 {
     ec->state.permanent_version++;
-    if (ec->permanent.protected_mode && ec->state.phase == ASI_PHASE_DATA_EXCHANGE) {
+    if (ec->permanent.protected_mode) {
         const asi_list_t las = ec->state.las;
         for (unsigned i = asi_list_next(&las, 0u); i < ASI_INDICES; i = asi_list_next(&las, i + 1u)) {
             if (!ec_may_activate(ec, i))
                 ec_leave_las(ec, i);
         }
-        if (!ec->reactivate)
+        if (ec->state.phase == ASI_PHASE_DATA_EXCHANGE)
             ec_run_cycle(ec);
     }
     ec_update_flags(ec);
@@ -147,7 +147,7 @@ asi_status_t asi_fn_set_controls(asi_ec_t *ec, const asi_controls_t *c)
     if (ec->state.phase == ASI_PHASE_DATA_EXCHANGE) { /* EX-024 */
         if (starts)
             ec_reactivate(ec, 0u);
-        else if (stops && !ec->reactivate)
+        else if (stops)
             ec_run_cycle(ec);
     }
     if (changed) {
@@ -177,6 +177,7 @@ asi_status_t asi_ec_init(asi_ec_t *ec, const asi_permanent_t *permanent)
             ec->permanent.projection.pp[i] = 15u;
         }
     }
+    ec->state.offline_causes = 1u << ASI_OFFLINE_START | (uint32_t)ASI_OFFLINE_START << 16; /* EX-037 */
     asi_ctt_init(&ec->ctt);
     for (unsigned i = 0; i < ASI_INDICES; i++) {
         ec->state.cdi[i] = ASI_CODES_NONE;

@@ -36,8 +36,8 @@ bool ec_may_activate(const asi_ec_t *ec, unsigned index)
 
 bool ec_has_strings(const asi_ec_t *ec, unsigned index)
 {
-    const unsigned kind = asi_ctt_kind(ec->state.cdi[index]);
-    return (kind == ASI_CTT_1_IN || kind == ASI_CTT_1_OUT) && asi_codes_id(ec->state.cdi[index]) == 4u;
+    const unsigned codes = ec->state.cdi[index];
+    return (codes & 0xFFu) == 0x47u && asi_ctt_kind((uint16_t)codes) != ASI_CTT_NONE; /* S-7.4, not as 4I/4O */
 }
 
 unsigned ec_parameter(const asi_ec_t *ec, unsigned index)

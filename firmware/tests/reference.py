@@ -39,7 +39,7 @@ class Reference:
         self.probes = self.managements = 0  # how many there were: names a call
         self.polled, self.since_poll = 0, 0
         self.batches = self.search = None  # generators
-        self.changed_slaves, self.changed_us, self.causes, self.offline_us = set(), 0, 0, 0
+        self.changed_slaves, self.changed_us, self.causes, self.offline_us = set(), 0, 1, 0
         self.now = 0
 
     # ---- rules
@@ -329,8 +329,8 @@ class Reference:
         return 0
 
     def permanent_changed(self):
-        """EX-009. In the activation phase the core does not look (test_projection_change_between_activation_batches)."""
-        if self.protected and self.phase == DATA_EXCHANGE:
+        """EX-009"""
+        if self.protected:
             for i in [i for i in self.las if not self.allowed(i)]:
                 self.leave_las(i)
         return 0

@@ -91,8 +91,6 @@ class World:
     def control(self):
         name = self.dice.choice(("protected_mode", "offline", "data_exchange", "auto_address", "auto_clear"))
         value = self.dice.randrange(5) if name == "auto_clear" else self.dice.random() < (0.2 if name == "offline" else 0.5)
-        if name == "data_exchange" and value and self.compare.r.reading:
-            return  # known: an inclusion that is under way stops the new activation
         if name == "auto_address" and value and any(s.index == 0 for s in self.m.slaves):
             return
         self.m.control(**{name: value})

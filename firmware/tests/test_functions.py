@@ -162,7 +162,6 @@ def test_auto_address_control():
     assert not m.controls()["auto_address"] and m.read()["permanent_version"] == stored + 2
 
 
-@pytest.mark.xfail(strict=True, reason="asi_inclusion.c restarts the cycle that ec_reactivate has stopped")
 def test_data_exchange_back_during_an_inclusion():
     """EX-024, FN-019, EX-013: the slave that is included in the last cycle before the new activation does not stop it."""
     for moment in range(1, 12):

@@ -854,7 +854,7 @@ def strings_line(library, **kw):
 def test_strings(fake_strings, function, parameter, kind):
     """FN-027, FN-028, FN-029, FN-030, FN-032: parameter of the mode, string, parameter F; the bytes are there."""
     m = strings_line(fake_strings)
-    data = bytes(range(100, 140)) if function == WRITE_STRING else b""
+    data = bytes(range(100, 139)) if function == WRITE_STRING else b""
     del m.calls[:]
     assert m.begin(function, 3, 0, data) == 0
     m.until(lambda: m.lib.fake_open(), 20)
@@ -892,7 +892,7 @@ def test_refusals_of_strings(fake_strings):
     assert m.slaves[0].parameter == 15 and m.begin(WRITE_PARAMETER, 3, 4) == PROFILE
     assert m.begin(READ_STRING, 20) == NOT_ACTIVE and m.begin(READ_STRING, 0) == ARG == m.begin(READ_STRING, 32)
     for index in (4, 5, 7):
-        assert m.begin(READ_STRING, index) == PROFILE and m.begin(WRITE_STRING, index, 0, b"a") == PROFILE
+        assert m.begin(READ_STRING, index) == PROFILE and m.begin(WRITE_STRING, index, 0, b"abc") == PROFILE
     assert m.begin(MESSAGE, 3, 0, b"a") == PROFILE
     assert m.begin(WRITE_STRING, 3, 0, length=220) == TOO_LONG and m.begin(MESSAGE, 7, 0, length=225) == TOO_LONG
     m.cycles(4)

@@ -83,9 +83,8 @@ class Line(RuleBasedStateMachine):
         st.tuples(st.sampled_from(["protected_mode", "offline", "data_exchange", "auto_address"]), st.booleans()),
         st.tuples(st.just("auto_clear"), st.integers(0, 4))))
     def control(self, change):
-        known = change == ("data_exchange", True) and self.compare.r.reading  # see test_functions.py
         addressing = change == ("auto_address", True) and self.find(0)  # not part of the reference
-        if not known and not addressing:
+        if not addressing:
             self.m.control(**dict([change]))
 
     @rule(some=st.lists(slaves().filter(lambda s: s.index), max_size=3, unique_by=lambda s: s.index),
