@@ -168,7 +168,8 @@ async def new_code_is_fetched(dut):
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
 async def registers(dut):
-    """LK-010, LK-014, LK-021, EX-011: registers drive the sequencer and show its state; a BATCH write is one start pulse."""
+    """LK-010, LK-014, LK-021, EX-011: registers drive the sequencer and show its state; a BATCH write is one start
+    pulse."""
     tb = TB(dut)
     await tb.start()
     assert await tb.peek(reg("ID")) == 0x4153_0001
@@ -199,7 +200,8 @@ async def registers(dut):
 
 @cocotb.test(timeout_time=10, timeout_unit="ms")
 async def events(dut):
-    """LK-007, LK-019, LT-016, HW-002, EX-021: events are sticky, cleared one by one, and not lost in the clock of a clearing write."""
+    """LK-007, LK-019, LT-016, HW-002, EX-021: events are sticky, cleared one by one, and not lost in the clock of a
+    clearing write."""
     tb = TB(dut)
     await tb.start()
     await tb.poke(reg("EVENT"), 0xFF)
@@ -224,7 +226,7 @@ async def events(dut):
         assert await tb.peek(reg("EVENT")) & ~16 == 0, name
     await raise_("apf_change")                                     # power back: an event again
     assert await tb.peek(reg("EVENT")) & ~16 == 8
-    for name in ("cycle_done", "batch_done", "slave_lost", "exchange_done"):  # exactly in the clock of the clearing write
+    for name in ("cycle_done", "batch_done", "slave_lost", "exchange_done"):  # in the clock of the clearing write
         await tb.begin(WRITE[4], reg("EVENT"), 0xFF)
         while not (int(dut.regs_req.value) and int(dut.dwe.value)):
             await FallingEdge(tb.clk)
