@@ -16,7 +16,7 @@
 /** Functions of the mailbox that are not in the list of 30. */
 enum { FN_SET_AUTO_CLEAR = 33 };
 
-static uint32_t in_seq, fw_seq, fn_seq, shown_version, shown_log, shown_permanent, analog_numbers;
+static uint32_t longest_us, in_seq, fw_seq, fn_seq, shown_version, shown_log, shown_permanent, analog_numbers;
 static bool fn_open;   /* a function with telegrams is under way */
 static bool monitor;
 
@@ -159,6 +159,14 @@ void asi_window_publish(asi_ec_t *ec)
         show_state(ec);
     WIN(IN_SEQ)[0] = ++in_seq;
     hal_host_interrupt();
+}
+
+void asi_window_show_load(uint32_t us)
+{
+    if (us > longest_us) {
+        longest_us = us;
+        WIN(CORE_LOAD)[0] = us;
+    }
 }
 
 /* ------------------------------------------------------------------------------------------ commits */

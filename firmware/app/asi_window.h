@@ -18,6 +18,8 @@ void asi_window_open(asi_ec_t *ec);
 void asi_window_take_outputs(asi_ec_t *ec);
 /** State, images, lists and counters after a cycle (HW-003 .. HW-005). In the interrupt. */
 void asi_window_publish(asi_ec_t *ec);
+/** How long an interrupt took, us; the longest shows (HW-011). */
+void asi_window_show_load(uint32_t us);
 /** True when something besides the images changed since the last publication. */
 bool asi_window_is_stale(const asi_ec_t *ec);
 /** Apply the host's commit, start or finish its function (HW-002, HW-008). Main loop. @return true: call again at once */

@@ -15,6 +15,8 @@ void asi_interrupt(void);
 /** The one interrupt (startup.S). Bounded: each event is served once, at most 64 results, slaves or codes each. */
 void asi_interrupt(void)
 {
+    const uint32_t began = asi_port_time_us();
+    const bool cycling = asi_ec_state(&ec)->phase == ASI_PHASE_DATA_EXCHANGE;
     const uint32_t events = hal_take_events();
     bool publish = false;
 
@@ -48,6 +50,8 @@ void asi_interrupt(void)
     /* outside running cycles a change of phase, flags or lists is news enough */
     if (publish || (asi_ec_state(&ec)->phase != ASI_PHASE_DATA_EXCHANGE && asi_window_is_stale(&ec)))
         asi_window_publish(&ec);
+    if (cycling)
+        asi_window_show_load(asi_port_time_us() - began);
     hal_leave_time();
 }
 

@@ -146,7 +146,7 @@ typedef struct {
 /** Whether any slave is open: else images and calls are plain. */
 static inline bool asi_ctt_any(const asi_ctt_t *c)
 {
-    return (c->live.w[0] | c->live.w[1] | c->groups | c->safety) != 0u;
+    return (c->live.w[0] | c->live.w[1] | c->groups | c->grouped | c->safety) != 0u;
 }
 
 /** Whether a string to write is whole sequences of 3 bytes, n up to 255. The core cannot divide, and a loop that subtracts

@@ -350,27 +350,56 @@ static void auto_clear(asi_ec_t *ec)
     ec_stop(ec, ASI_OFFLINE_AUTO_CLEAR);
 }
 
+/** A live slave, if it was called since the last look: its answer to the engine, the engine's next nibble to its slot. */
+static void exchange_live(asi_ec_t *ec, unsigned i, uint32_t now_us)
+{
+    const asi_slot_state_t slot = asi_port_slot_state(i);
+    if (slot.calls == ec->calls[i])
+        return; /* the other one of an A/B pair was called */
+    const unsigned worked = ec->ctt.status[i] & ASI_CTT_TV;
+    asi_ctt_call_t call = {.ok = slot.error == ASI_ERR_OK, .sent = slot.sent, .answer = slot.data, .now_us = now_us};
+    ec->calls[i] = slot.calls;
+    if (ec->ctt.kind[i] <= ASI_CTT_1_OUT) { /* no digital bits: spares some shifts, which this core does bit by bit */
+        asi_port_live(i, asi_ctt_call(&ec->ctt, i, &call));
+    } else {
+        const unsigned w = asi_word(i), shift = asi_shift(i);
+        call.outputs = (uint8_t)(ec->out_host[w] >> shift & 15u);
+        asi_port_live(i, asi_ctt_call(&ec->ctt, i, &call));
+        ec->live_in[w] = (ec->live_in[w] & ~(15u << shift)) | asi_ctt_inputs(&ec->ctt, i, slot.data) << shift;
+    }
+    if ((ec->ctt.status[i] & ASI_CTT_TV) != worked && (worked != 0u || asi_list_has(&ec->ctt_failed, i))) {
+        ec_log(ec, ASI_EVENT_CTT, i, worked == 0u); /* not the first time it works: that is no news */
+        if (worked != 0u)
+            asi_list_add(&ec->ctt_failed, i);
+        else
+            asi_list_remove(&ec->ctt_failed, i);
+    }
+}
+
 void asi_ec_exchange_done(asi_ec_t *ec)
 {
+    const asi_list_t live = ec->ctt.live;
     if (ec->state.phase != ASI_PHASE_DATA_EXCHANGE || !ec->permanent.data_exchange)
         return;
-    const uint32_t now = asi_list_is_empty(&ec->ctt.live) ? 0u : asi_port_time_us();
-    for (unsigned i = asi_list_next(&ec->ctt.live, 0u); i < ASI_INDICES; i = asi_list_next(&ec->ctt.live, i + 1u)) {
-        const asi_slot_state_t slot = asi_port_slot_state(i);
-        if (slot.calls == ec->calls[i])
-            continue; /* the other one of an A/B pair was called */
-        ec->calls[i] = slot.calls;
-        const asi_ctt_call_t call = {.ok = slot.error == ASI_ERR_OK, .sent = slot.sent, .answer = slot.data,
-                                     .outputs = (uint8_t)(ec->out_host[asi_word(i)] >> asi_shift(i) & 15u), .now_us = now};
-        asi_port_live(i, asi_ctt_call(&ec->ctt, i, &call));
+    const uint32_t now_us = asi_port_time_us();
+    /* by numbers, as they will be called; a plain walk, because looking for bits costs more than the few that are not live */
+    for (uint32_t n = 1u, a = live.w[0] >> 1, b = live.w[1] >> 1; (a | b) != 0u; n++, a >>= 1, b >>= 1) {
+        if (a & 1u)
+            exchange_live(ec, n, now_us);
+        if (b & 1u)
+            exchange_live(ec, n + 32u, now_us);
     }
 }
 
 /** Inputs that are not the plain answer: combined transactions and safety slaves. */
 static void ctt_images(asi_ec_t *ec, uint32_t in[ASI_IMAGE_WORDS])
 {
-    asi_list_t called = ASI_LIST_EMPTY, failed = ASI_LIST_EMPTY;
     const asi_list_t groups = {{ec->ctt.groups | ec->ctt.safety, 0u}};
+    asi_list_t called = ASI_LIST_EMPTY, failed = ASI_LIST_EMPTY;
+    for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++)
+        in[w] = (in[w] & ~ec->live_mask[w]) | ec->live_in[w];
+    if ((groups.w[0] | ec->ctt.grouped) == 0u)
+        return;
     for (unsigned i = asi_list_next(&groups, 0u); i < ASI_INDICES; i = asi_list_next(&groups, i + 1u)) {
         const asi_slot_state_t slot = asi_port_slot_state(i);
         if (slot.calls == ec->calls[i])
@@ -379,10 +408,6 @@ static void ctt_images(asi_ec_t *ec, uint32_t in[ASI_IMAGE_WORDS])
         asi_list_add(&called, i);
         if (slot.error != ASI_ERR_OK)
             asi_list_add(&failed, i);
-    }
-    for (unsigned i = asi_list_next(&ec->ctt.live, 0u); i < ASI_INDICES; i = asi_list_next(&ec->ctt.live, i + 1u)) {
-        const unsigned w = asi_word(i), shift = asi_shift(i), answer = in[w] >> shift & 15u;
-        in[w] = (in[w] & ~(15u << shift)) | asi_ctt_inputs(&ec->ctt, i, answer) << shift;
     }
     asi_ctt_cycle(&ec->ctt, &ec->state.las, &called, &failed, ec->state.cdi, in, ec->out_host);
 }

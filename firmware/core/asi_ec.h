@@ -110,6 +110,8 @@ typedef struct {
     uint8_t suspicion[ASI_INDICES];
     uint8_t miss[ASI_INDICES];    /* rounds missed by a slave in LDS, not in LAS (EX-014) */
     uint8_t calls[ASI_INDICES];   /* asi_slot_state_t.calls seen last, of combined transactions */
+    asi_list_t ctt_failed;        /* combined transactions that stopped working (ASI_EVENT_CTT) */
+    uint32_t live_mask[ASI_IMAGE_WORDS], live_in[ASI_IMAGE_WORDS]; /* digital inputs of combined transactions */
     uint32_t out_host[ASI_IMAGE_WORDS], out_line[ASI_IMAGE_WORDS];
     uint32_t las_mask[ASI_IMAGE_WORDS];  /* F where a slave is active */
     uint32_t invert[ASI_IMAGE_WORDS];    /* payload bits of active slaves */

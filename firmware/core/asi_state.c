@@ -189,8 +189,10 @@ void ec_enter_las(asi_ec_t *ec, unsigned index)
     ec->las_mask[w] |= 15u << shift;
     ec->invert[w] |= (ASI_INVERT_OUT ? (extended ? 7u : 15u) : 0u) << shift;
     ec->calls[index] = 0;
-    if (live)
+    if (live) {
+        ec->live_mask[w] |= 15u << shift;
         asi_port_live(index, asi_ctt_first(&ec->ctt, index, ec->out_host[w] >> shift & 15u));
+    }
     asi_port_slot(index, true, extended, live);
     if (ec->state.phase == ASI_PHASE_DATA_EXCHANGE)
         ec_log(ec, ASI_EVENT_ACTIVATED, index, 0u);
@@ -203,10 +205,13 @@ void ec_leave_las(asi_ec_t *ec, unsigned index)
         return;
     asi_port_slot(index, false, false, false);
     asi_ctt_close(&ec->ctt, index);
+    asi_list_remove(&ec->ctt_failed, index);
     asi_list_remove(&ec->state.las, index);
     asi_list_remove(&ec->state.lpf, index); /* EX-027 */
     ec->las_mask[asi_word(index)] &= others;
     ec->invert[asi_word(index)] &= others;
+    ec->live_mask[asi_word(index)] &= others;
+    ec->live_in[asi_word(index)] &= others;
     ec->state.in[asi_word(index)] &= others; /* CA-006, LK-005 */
     if (ec->state.phase == ASI_PHASE_DATA_EXCHANGE)
         ec_log(ec, ASI_EVENT_DEACTIVATED, index, 0u);

@@ -259,7 +259,8 @@ typedef struct __attribute__ ((__packed__)) {
     uint32_t OFFLINE_TIME;
     uint32_t SUSPECTS[2];
     uint32_t LOG_HEAD;
-    uint8_t RESERVED_720_7ff[0xe0];
+    uint32_t CORE_LOAD;
+    uint8_t RESERVED_724_7ff[0xdc];
     log_r_t LOG[64];
     uint8_t RESERVED_a00_fff[0x600];
     stat_r_t STAT[64];

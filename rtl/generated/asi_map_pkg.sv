@@ -172,6 +172,7 @@ package asi_map_pkg;
   localparam int unsigned HostOfflineTime = 'h710;
   localparam int unsigned HostSuspects = 'h714;
   localparam int unsigned HostLogHead = 'h71c;
+  localparam int unsigned HostCoreLoad = 'h720;
   localparam int unsigned HostLog = 'h800;
   localparam int unsigned HostStat = 'h1000;
   localparam int unsigned HostRing = 'h2000;
