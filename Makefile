@@ -113,9 +113,9 @@ PLANT ?= sim/plants/packaging.toml
 RUN_LIB = $(BUILD)/tb/libasi_chip$(if $(filter 1,$(WAVES)),_trace).so
 $(foreach v,WAVES QUICK,$(if $(filter-out 0 1,$($v)),$(error $v=$($v): must be 0 or 1)))
 .PHONY: run check
-run: $(VENV)/.ready $(RUN_LIB) $(BUILD)/firmware/asi.hex $(BUILD)/firmware/asi_test.hex  ## run a plant: make run PLANT=... TIME=500ms WAVES=1 QUICK=0
+run: $(VENV)/.ready $(RUN_LIB) $(if $(FLASH),$(BUILD)/tb/libasi_slaves.so) $(BUILD)/firmware/asi.hex $(BUILD)/firmware/asi_test.hex  ## run a plant: make run PLANT=... TIME=500ms WAVES=1 QUICK=0 FLASH=FILE
 	@$(VPY) -m asi run "$(PLANT)" $(if $(TIME),--time $(TIME)) $(if $(filter 1,$(WAVES)),--waves) \
-	  $(if $(filter 1,$(QUICK)),--quick) $(if $(filter 0,$(QUICK)),--no-quick) $(RUN_ARGS)
+	  $(if $(filter 1,$(QUICK)),--quick) $(if $(filter 0,$(QUICK)),--no-quick) $(if $(FLASH),--flash "$(FLASH)") $(RUN_ARGS)
 
 check: $(VENV)/.ready  ## check a plant file without running it: make check PLANT=...
 	@$(VPY) -m asi check "$(PLANT)"

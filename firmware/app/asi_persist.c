@@ -48,6 +48,13 @@ const asi_permanent_t *asi_persist_open(void)
     return &set.master;
 }
 
+void asi_persist_refuse(void)
+{
+    store.state = ASI_STORE_CORRUPT;
+    in_flash = false;
+    set_defaults();
+}
+
 void asi_persist_request(const asi_permanent_t *now)
 {
     wanted = *now;

@@ -14,6 +14,8 @@
  * some ms. @return the stored data, else defaults: nothing projected, codes FFFF, parameters F, configuration mode,
  *   data exchange on, no automatic addressing, no auto clear. Stays valid, and unchanged until asi_persist_request */
 const asi_permanent_t *asi_persist_open(void);
+/** What asi_persist_open gave is whole but makes no sense: the same as corrupt, so defaults are in use. */
+void asi_persist_refuse(void);
 /** Have this stored unless it is what is in flash already. It is copied; it must not change during the call. While a
  * store is under way the newest request waits. After a failed store, or without a flash, nothing is tried again until
  * the next request. */

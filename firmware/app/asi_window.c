@@ -19,17 +19,23 @@ enum { FN_SET_AUTO_CLEAR = 33 };
 static uint32_t longest_us, in_seq, fw_seq, fn_seq, shown_version, shown_log, shown_permanent, analog_numbers;
 static bool fn_open;   /* a function with telegrams is under way */
 static bool monitor;
+static bool host_offline; /* what HOST_CTRL.offline says; the monitor keeps the line off without it */
 
 /* ------------------------------------------------------------------------------------------ start */
 
-static void show_permanent(const asi_permanent_t *p, bool offline)
+static void show_controls(const asi_permanent_t *p)
 {
     WIN(HOST_CTRL)[0] = (p->protected_mode ? HOST_CTRL_R__PROTECTED_MODE_bm : 0u) |
-                        (offline && !monitor ? HOST_CTRL_R__OFFLINE_bm : 0u) |
+                        (host_offline ? HOST_CTRL_R__OFFLINE_bm : 0u) |
                         (p->data_exchange ? HOST_CTRL_R__DATA_EXCHANGE_bm : 0u) |
                         (p->auto_address ? HOST_CTRL_R__AUTO_ADDRESS_ENABLE_bm : 0u) |
                         (monitor ? HOST_CTRL_R__MONITOR_bm : 0u) |
                         (uint32_t)p->auto_clear << HOST_CTRL_R__AUTO_CLEAR_bp;
+}
+
+static void show_permanent(const asi_permanent_t *p)
+{
+    show_controls(p);
     WIN(LPS_CFG)[0] = p->projection.lps.w[0];
     WIN(LPS_CFG)[1] = p->projection.lps.w[1];
     for (unsigned i = 0; i < ASI_INDICES; i++) {
@@ -44,7 +50,7 @@ void asi_window_init(const asi_permanent_t *permanent)
         WIN(MAGIC)[w] = 0;
     asi_diag_init();
     WIN(VERSION)[0] = ASI_VERSION;
-    show_permanent(permanent, false);
+    show_permanent(permanent);
 }
 
 void asi_window_open(asi_ec_t *ec)
@@ -115,11 +121,22 @@ static void show_log(const asi_log_t *log)
     WIN(LOG_HEAD)[0] = shown_log; /* last */
 }
 
+/** EX-033: the end state of auto clear lasts until the host leaves the offline phase, so no commit may do that in passing.
+ * Before the host sees the phase, and one bit at once: it may be preparing a commit. */
+static void follow_auto_clear(const asi_ec_t *ec)
+{
+    if (host_offline || monitor || !asi_fn_controls(ec).offline)
+        return;
+    host_offline = true;
+    WIN(HOST_CTRL)[0] |= HOST_CTRL_R__OFFLINE_bm;
+}
+
 /** What seldom changes: lists, codes, history, log. */
 static void show_state(asi_ec_t *ec)
 {
     const asi_ec_state_t *s = asi_ec_state(ec);
     shown_version = s->version;
+    follow_auto_clear(ec);
     WIN(FLAGS)[0] = s->flags;
     WIN(PHASE)[0] = (uint32_t)s->phase;
     show_list(WIN(LDS), &s->lds);
@@ -185,7 +202,6 @@ static bool serve_commit(asi_ec_t *ec)
 {
     static asi_projection_t p;
     const uint32_t seq = WIN(HOST_SEQ)[0];
-    const uint32_t word = WIN(HOST_CTRL)[0];
     if (seq == fw_seq)
         return false;
     p.lps = (asi_list_t){{WIN(LPS_CFG)[0], WIN(LPS_CFG)[1]}};
@@ -193,29 +209,34 @@ static bool serve_commit(asi_ec_t *ec)
         p.pcd[i] = WINDOW(uint16_t, PCD)[i];
         p.pp[i] = WINDOW(uint8_t, PP)[i];
     }
-    if (WIN(HOST_SEQ)[0] != seq)
+    asi_status_t status = asi_check_projection(&p);
+    hal_irq_off();
+    const uint32_t word = WIN(HOST_CTRL)[0]; /* with auto clear's bit, if that has just stopped the line */
+    if (WIN(HOST_SEQ)[0] != seq) {
+        hal_irq_on();
         return true;
+    }
 
     const bool monitors = (word & HOST_CTRL_R__MONITOR_bm) != 0u; /* ST-007: a monitor is silent */
+    const bool offline = (word & HOST_CTRL_R__OFFLINE_bm) != 0u;
     const asi_controls_t controls = {
         .protected_mode = (word & HOST_CTRL_R__PROTECTED_MODE_bm) != 0u,
-        .offline = (word & HOST_CTRL_R__OFFLINE_bm) != 0u || monitors,
+        .offline = offline || monitors,
         .data_exchange = (word & HOST_CTRL_R__DATA_EXCHANGE_bm) != 0u,
         .auto_address = (word & HOST_CTRL_R__AUTO_ADDRESS_ENABLE_bm) != 0u,
         .auto_clear = (word & HOST_CTRL_R__AUTO_CLEAR_bm) >> HOST_CTRL_R__AUTO_CLEAR_bp,
     };
-    asi_status_t status = (word & ~(uint32_t)ALL_CONTROLS) ? ASI_E_ARG : asi_check_projection(&p);
-    hal_irq_off();
+    if (word & ~(uint32_t)ALL_CONTROLS)
+        status = ASI_E_ARG;
     asi_window_take_outputs(ec); /* data exchange may begin */
     if (status == ASI_OK)
         status = asi_fn_set_controls(ec, &controls);
     if (status == ASI_OK) {
+        monitor = monitors;
+        host_offline = offline;
         status = asi_fn_set_projection(ec, &p);
         asi_window_publish(ec);
         keep_permanent(ec);
-    }
-    if (status == ASI_OK) {
-        monitor = monitors;
         asi_diag_commit(monitor);
     }
     fw_seq = seq;
@@ -232,16 +253,20 @@ static asi_status_t set_control(asi_ec_t *ec, unsigned code, uint32_t value)
 {
     asi_controls_t c = asi_fn_controls(ec);
     const bool on = value == 1u;
+    asi_status_t status;
     if (code == 18u ? value != 1u && value != 2u : code == FN_SET_AUTO_CLEAR ? value > 3u : value > 1u)
         return ASI_E_ARG;
     switch (code) {
     case 17u: c.protected_mode = on; break;
-    case 18u: c.offline = on; break;
+    case 18u: c.offline = on || monitor; break; /* ST-007: in a monitor it says what comes after it */
     case 19u: c.data_exchange = on; break;
     case 21u: c.auto_address = on; break;
     default: c.auto_clear = (uint8_t)value; break;
     }
-    return asi_fn_set_controls(ec, &c);
+    status = asi_fn_set_controls(ec, &c);
+    if (status == ASI_OK && code == 18u)
+        host_offline = on;
+    return status;
 }
 
 /** @return ASI_E_BUSY: it needs telegrams and has begun; else what it ends with. The interrupt is masked. */
@@ -266,11 +291,22 @@ static asi_status_t start_function(asi_ec_t *ec, unsigned code, uint32_t a, uint
     return status == ASI_OK ? ASI_E_BUSY : status;
 }
 
-static void end_function(asi_status_t status, uint32_t data)
+static void end_function(asi_status_t status, uint32_t data, uint32_t length)
 {
+    WIN(FN_LEN)[0] = length;
     WIN(FN_STATUS)[0] = (uint32_t)status;
     WIN(FN_DATA)[0] = data;
     WIN(FN_DONE)[0] = fn_seq; /* last */
+}
+
+static void end_job(const asi_job_t *job, const asi_string_t *string)
+{
+    unsigned length = 0;
+    if (job->kind >= ASI_JOB_READ_PARAMETER_STRING && job->kind <= ASI_JOB_MESSAGE && job->length <= STRING_BYTES)
+        length = job->length;
+    for (unsigned k = 0; k < length; k++)
+        WINDOW(uint8_t, FN_STRING)[k] = string->bytes[k];
+    end_function(job->status, job->data, length);
 }
 
 static void serve_function(asi_ec_t *ec)
@@ -281,13 +317,8 @@ static void serve_function(asi_ec_t *ec)
         if (job->status == ASI_E_BUSY)
             return;
         fn_open = false;
-        WIN(FN_LEN)[0] = 0;
-        if (job->kind >= ASI_JOB_READ_PARAMETER_STRING && job->kind <= ASI_JOB_MESSAGE && job->length <= STRING_BYTES) {
-            for (unsigned k = 0; k < job->length; k++)
-                WINDOW(uint8_t, FN_STRING)[k] = string->bytes[k];
-            WIN(FN_LEN)[0] = job->length;
-        }
-        end_function(job->status, job->data);
+        if (WIN(FN_SEQ)[0] == fn_seq) /* else the words are the next function's already, and nobody waits for this answer */
+            end_job(job, string);
     }
     const uint32_t seq = WIN(FN_SEQ)[0];
     if (seq == fn_seq)
@@ -305,8 +336,8 @@ static void serve_function(asi_ec_t *ec)
         }
         asi_window_take_outputs(ec); /* as in a commit */
         status = start_function(ec, code, a, b, length);
-        if (asi_ec_state(ec)->permanent_version != shown_permanent)
-            show_permanent(&ec->permanent, ec->offline); /* the host's own words follow: its next commit keeps the change */
+        if (asi_ec_state(ec)->permanent_version != shown_permanent || (code == 18u && status == ASI_OK))
+            show_permanent(&ec->permanent); /* the host's own words follow: its next commit keeps the change */
         keep_permanent(ec);
         if (asi_window_is_stale(ec))
             asi_window_publish(ec);
@@ -315,7 +346,7 @@ static void serve_function(asi_ec_t *ec)
     fn_seq = seq;
     fn_open = status == ASI_E_BUSY;
     if (!fn_open)
-        end_function(status, 0u);
+        end_function(status, 0u, 0u);
 }
 
 bool asi_window_serve(asi_ec_t *ec)

@@ -71,7 +71,8 @@ int main(void)
 {
     hal_init();
     const asi_permanent_t *permanent = asi_persist_open(); /* NV-009: before the first telegram */
-    (void)asi_ec_init(&ec, permanent); /* what makes no sense: factory settings, and the window shows them */
+    if (asi_ec_init(&ec, permanent) != ASI_OK)
+        asi_persist_refuse(); /* factory settings, and the window shows them */
     asi_log_put(&ec.log, asi_port_time_us(), ASI_EVENT_START, 0u, asi_persist_word() & STORE_R__STATE_bm);
     asi_window_init(&ec.permanent);
     asi_ec_power(&ec, hal_apf());

@@ -18,6 +18,7 @@ from asi import regmap
 BUILD = ROOT / "build/firmware/soc"
 MAX_CLOCKS = 400_000
 CYCLE_DONE, BATCH_DONE, SLAVE_LOST, APF_CHANGE, TICK, HOST_ATTN = (1 << k for k in range(6))
+EXCHANGE_DONE = 1 << 7
 
 
 @functools.cache
@@ -58,6 +59,10 @@ def image(name):
     return [int(line, 16) for line in (ROOT / f"build/firmware/{name}.hex").read_text().split()]
 
 
+def signed(word):
+    return word - (1 << 32) * (word >> 31)
+
+
 class Chip:
     """Core, fake sequencer and slaves, and the host's side of the window."""
 
@@ -79,7 +84,7 @@ class Chip:
         """Until the core sleeps; it must, and by then all events are served."""
         assert self.lib.soc_run(MAX_CLOCKS) == 1, "the core does not come back to sleep"
         assert self.r.event & self.r.event_en == 0
-        assert self.r.bad_accesses == self.r.seq_violations == self.r.batch_while_busy == 0
+        assert self.r.bad_accesses == self.r.seq_violations == self.r.torn_writes == self.r.batch_while_busy == 0
         return self
 
     def event(self, bits):
@@ -144,6 +149,8 @@ class Chip:
                     events |= SLAVE_LOST
                     value &= ~(15 << i % 8 * 4)
             self.link[work + i // 8] = value & 0xFFFFFFFF
+        if self.r.event_en & EXCHANGE_DONE:  # there are live slots
+            self.event(EXCHANGE_DONE)
         mgmt, incl = link_at("MGMT_REQ") // 4, link_at("INCL_REQ") // 4
         pending = (self.link[mgmt] ^ self.link[mgmt + 1]) >> 16 & 255
         if pending and not (self.was_management and self.link[incl] >> 31):
@@ -222,5 +229,36 @@ class Chip:
         self.write("HOST_SEQ", self.read("HOST_SEQ") + 1 & 0xFFFFFFFF)
         self.event(HOST_ATTN)
         assert self.read("FW_SEQ") == self.read("HOST_SEQ")
-        return self.read("FW_RESULT") - (1 << 32) * (self.read("FW_RESULT") >> 31)
+        return signed(self.read("FW_RESULT"))
+
+    def ask(self, code, a=0, b=0, string=b""):
+        """Begin a function of the mailbox; wakes nobody."""
+        for k in range(0, len(string), 4):
+            self.write("FN_STRING", int.from_bytes(string[k:k + 4], "little"), k // 4)
+        for name, value, k in (("FN_LEN", len(string), 0), ("FN_CODE", code, 0), ("FN_ARG", a, 0), ("FN_ARG", b, 1)):
+            self.write(name, value, k)
+        self.write("FN_SEQ", self.read("FN_SEQ") + 1 & 0xFFFFFFFF)
+
+    @property
+    def answered(self):
+        return self.read("FN_DONE") == self.read("FN_SEQ")
+
+    def function(self, code, a=0, b=0, string=b"", steps=400):
+        """-> (FN_STATUS, FN_DATA, bytes of FN_STRING)"""
+        self.ask(code, a, b, string)
+        for _ in range(steps):
+            if self.answered:
+                break
+            self.step()
+        assert self.answered, f"function {code} has no answer"
+        length = self.read("FN_LEN")
+        words = b"".join(self.read("FN_STRING", k).to_bytes(4, "little") for k in range((length + 3) // 4))
+        return signed(self.read("FN_STATUS")), self.read("FN_DATA"), words[:length]
+
+    def events(self):
+        """The log: [(time, event, index, data)], oldest first"""
+        head = self.read("LOG_HEAD")
+        words = [(self.read("LOG", 2 * (n % 64)), self.read("LOG", 2 * (n % 64) + 1))
+                 for n in range(max(0, head - 64), head)]
+        return [(t, w & 255, w >> 8 & 255, w >> 16) for t, w in words]
 

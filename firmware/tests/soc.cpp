@@ -20,6 +20,7 @@ uint32_t flash_base, flash_bytes, flash_byte, flash_address, spi_data;
 uint8_t flash_command;
 bool asleep;
 uint64_t woke;
+uint32_t dice = 1;
 
 void write_masked(uint32_t &word, uint32_t data, uint32_t be) {
     uint32_t mask = 0;
@@ -86,14 +87,23 @@ void reg_write(uint32_t offset, uint32_t data) {
     }
 }
 
-/// published state, FLAGS to IN_IMG and CDI to PECHO without PCD and PP, may change only while IN_SEQ is odd
-void check_published(uint32_t offset) {
+/// published state, FLAGS to IN_IMG, CDI to PECHO without PCD and PP, combined transactions, history and log, may change
+/// only while IN_SEQ is odd; 16-bit values only as a whole
+void check_published(uint32_t offset, uint32_t be) {
     const bool lists = offset >= offsetof(asi_host_t, FLAGS) && offset < offsetof(asi_host_t, IN_SEQ);
     const bool image = offset >= offsetof(asi_host_t, IN_IMG) && offset < offsetof(asi_host_t, OUT_IMG);
     const bool codes = (offset >= offsetof(asi_host_t, CDI) && offset < offsetof(asi_host_t, PCD)) ||
                        (offset >= offsetof(asi_host_t, PI) && offset < offsetof(asi_host_t, LINE_FAULTS));
+    const bool analog = offset >= offsetof(asi_host_t, AIDI) && offset < offsetof(asi_host_t, AODI);
+    const bool combined = offset >= offsetof(asi_host_t, CTT_STATE) && offset < offsetof(asi_host_t, AIDI);
+    const bool safe = offset >= offsetof(asi_host_t, SAFE_IN) && offset < offsetof(asi_host_t, FN_SEQ);
+    const bool history = offset >= offsetof(asi_host_t, CHANGED_SLAVES) && offset < offsetof(asi_host_t, STAT);
     const bool open = window[offsetof(asi_host_t, MAGIC) / 4] != 0;
-    if (open && (lists || image || codes) && !(window[offsetof(asi_host_t, IN_SEQ) / 4] & 1)) s.seq_violations++;
+    if (!open) return;
+    if ((lists || image || codes || analog || combined || safe || history) &&
+        !(window[offsetof(asi_host_t, IN_SEQ) / 4] & 1)) s.seq_violations++;
+    if (analog && be != 3 && be != 12 && be != 15) s.torn_writes++;
+    s.analog_writes += analog, s.combined_writes += combined, s.safe_writes += safe;
 }
 
 uint32_t bus_read(uint32_t a) {
@@ -112,7 +122,7 @@ uint32_t bus_read(uint32_t a) {
 void bus_write(uint32_t a, uint32_t data, uint32_t be) {
     if (a < sizeof ram) write_masked(ram[a / 4], data, be);
     else if (a >> 14 == 0x40000000u >> 14) {
-        check_published(a & 0x3FFF);
+        check_published(a & 0x3FFF, be);
         write_masked(window[(a & 0x3FFF) / 4], data, be);
     }
     else if (a >> 10 == 0x80010000u >> 10 && be == 15) link_ram[(a & 0x3FF) / 4] = data;
@@ -127,6 +137,10 @@ void tick() {
     cpu->clk = 1;
     cpu->eval();
     s.clocks++;
+    if (s.shake_bytes) {  // a host that writes at every clock
+        dice = dice >> 1 ^ (dice & 1 ? 0xA3000000u : 0u);
+        for (uint32_t k = 0; k < s.shake_bytes / 4; k++) window[s.shake_address / 4 + k] = dice & 1 ? ~0u : 0u;
+    }
     // ready answers a request that was already there in the clock before
     const bool i = cpu->iBusWishbone_CYC && cpu->iBusWishbone_STB && !cpu->iBusWishbone_ACK;
     const bool d = cpu->dBusWishbone_CYC && cpu->dBusWishbone_STB && !cpu->dBusWishbone_ACK;

@@ -24,6 +24,9 @@ typedef struct {
     uint32_t awake_max;       /* clocks between leaving and re-entering WAIT, worst case since the test set it to 0 */
     uint32_t latch, monitor_ctrl, ring_head, ring_lost;
     uint32_t seq_violations;  /* published words changed while IN_SEQ was even */
+    uint32_t torn_writes;     /* writes to AIDI of less than a 16-bit value */
+    uint32_t analog_writes, combined_writes, safe_writes;  /* of AIDI, CTT_STATE, SAFE_IN */
+    uint32_t shake_address, shake_bytes;  /* window words that are 0 or FFFFFFFF, anew at every clock */
 } soc_state;
 
 int soc_open(uint32_t reset_vector, const uint8_t *flash, uint32_t flash_base, uint32_t flash_bytes);

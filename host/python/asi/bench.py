@@ -1,13 +1,66 @@
 # SPDX-License-Identifier: Apache-2.0
-"""asi.native.Chip seen as the runner wants it (asi.run.Bench): slaves, line power and host port of one chip."""
+"""asi.native.Chip seen as the runner wants it (asi.run.Bench): slaves, line power and host port of one chip; and the
+file that is the content of its flash."""
+import fcntl
 from pathlib import Path
 from typing import Any
 
 from asi.plant import Faults, Options, Slave
 
+NEW_FLASH = 1 << 21                                 # bytes; the storage ends at 0x120000 (docs/storage.md)
+FLASH_SIZES = tuple(1 << k for k in range(21, 25))  # 24-bit addresses
+
 
 class BenchError(Exception):
     """The simulation cannot be started: a library is missing or refuses."""
+
+
+class FlashError(Exception):
+    """The file cannot be the flash; one line for the user, the file's name in it."""
+
+
+class FlashFile:
+    """The flash's content between runs: read here, created erased when missing, given back with `write`.
+
+    Held until `close`, so that two runs do not store into one flash."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        try:
+            is_new = not path.exists()
+            self._file = open(path, "w+b" if is_new else "r+b")
+        except OSError as error:
+            raise FlashError(f"{path}: {error.strerror}") from None
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self.content = b"\xFF" * NEW_FLASH if is_new else self._file.read(FLASH_SIZES[-1] + 1)
+            if is_new:
+                self._put(self.content)
+        except BlockingIOError:
+            self._refuse("another run has this flash; give this one another file")
+        except OSError as error:
+            self._refuse(str(error.strerror))
+        if len(self.content) not in FLASH_SIZES:
+            sizes = ", ".join(str(size >> 20) for size in FLASH_SIZES)
+            self._refuse(f"not the content of a flash: it has to be {sizes} MB long, exactly")
+
+    def _refuse(self, reason: str) -> None:
+        self._file.close()
+        raise FlashError(f"{self.path}: {reason}")
+
+    def _put(self, content: bytes) -> None:
+        self._file.seek(0)
+        self._file.write(content)
+        self._file.flush()
+
+    def write(self, content: bytes) -> None:
+        """The content after the run, of the same length. OSError."""
+        if content != self.content:
+            self._put(content)
+            self.content = content
+
+    def close(self) -> None:
+        self._file.close()
 
 
 class NativeBench:
@@ -15,6 +68,7 @@ class NativeBench:
 
     def __init__(self, chip: Any):
         self.chip, self.net, self.clk_hz = chip, chip.net, chip.clk_hz
+        self._flash: Any = None
 
     def time(self) -> int:
         return self.chip.time_ns
@@ -85,6 +139,21 @@ class NativeBench:
 
     def apf(self, low: bool) -> None:
         self.chip.apf(low)
+
+    def attach_flash(self, content: bytes) -> None:
+        """A flash with this content on the SPI pins; before the first run. BenchError: no library."""
+        from asi import native
+        try:
+            self._flash = native.Flash(len(content))
+            self._flash.load(0, content)
+        except (OSError, RuntimeError) as error:
+            raise BenchError(str(error)) from None
+        self.chip.attach_flash(self._flash)
+
+    def flash_content(self) -> bytes:
+        """What is left in the flash when it is switched off now. Nothing may run after it."""
+        self._flash.power_up()  # breaks off what is under way
+        return self._flash.peek(0, self._flash.size)
 
     def close(self) -> None:
         self.chip.close()

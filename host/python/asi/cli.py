@@ -26,7 +26,7 @@ from rich.text import Text
 from asi import decode as decoding
 from asi import html_report, report
 from asi import replay as replaying
-from asi.bench import BenchError, name_waves, open_bench
+from asi.bench import BenchError, FlashError, FlashFile, name_waves, open_bench
 from asi.capture import ARM_V, UNITS, CaptureError, Info, Options
 from asi.eye import Eye
 from asi.native import NativeError
@@ -80,6 +80,28 @@ def _only_run(out: Path) -> Iterator[None]:
         raise _fail(f"{out}: another run writes there; give this one another folder with --out", BAD_INPUT) from None
     finally:
         os.close(folder)
+
+
+@contextmanager
+def _flash_file(path: Path | None) -> Iterator[FlashFile | None]:
+    if path is None:
+        yield None
+        return
+    try:
+        file = FlashFile(path)
+    except FlashError as error:
+        raise _fail(str(error), BAD_INPUT) from None
+    try:
+        yield file
+    finally:
+        file.close()
+
+
+def _write_back(file: FlashFile, content: bytes) -> None:
+    try:
+        file.write(content)
+    except OSError as error:
+        raise _fail(f"{file.path}: {error.strerror}", FAILED) from None
 
 
 class _Lines:
@@ -144,6 +166,9 @@ def run(
         show_default=False, help="Another firmware image; say its settle time with --settle.")] = None,
     settle: Annotated[int | None, typer.Option(
         "--settle", parser=_time, metavar="TIME", show_default=False, help="Settle time of that image.")] = None,
+    flash: Annotated[Path | None, typer.Option(
+        show_default=False, metavar="FILE",
+        help="Content of the flash: read before the run, written back after it; created erased when missing.")] = None,
 ) -> None:
     """Run a plant on the simulated master and report what happened."""
     described = _load(plant)
@@ -161,7 +186,7 @@ def run(
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _fail(f"{out}: {error.strerror}", BAD_INPUT) from None
-    with _only_run(out):
+    with _only_run(out), _flash_file(flash) as storage:
         console = Console(highlight=False)
         if not console.is_terminal:
             console = Console(highlight=False, width=120)  # a file or a pipe has no width of its own
@@ -176,6 +201,8 @@ def run(
                  *(["telegrams.log", "telegrams.jsonl"] if log else [])]
         try:
             bench = open_bench(image, wave_path, described.seed)
+            if storage is not None:
+                bench.attach_flash(storage.content)
         except BenchError as error:
             raise _fail(f"simulation: {error}", FAILED) from None
         try:
@@ -183,6 +210,8 @@ def run(
                 (out / old).unlink(missing_ok=True)  # never the waves or the page of another run beside this report
             with (_Bar if console.is_terminal else _Lines)(console) as progress:
                 result = Runner(described, bench, out, until_ns, log=log, html=html, progress=progress).run()
+            if storage is not None:
+                _write_back(storage, bench.flash_content())
             bench.close()
             if wave_path is not None:
                 files.append(name_waves(wave_path).name)
