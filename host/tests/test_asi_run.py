@@ -21,7 +21,7 @@ from asi.plant import Logged, load_plant, parse_plant
 from asi.regmap import ErrorClass, Phase
 from asi.run import Runner, Seen, compare
 from asi.status import LogEvent
-from asi.telegram import decode_call, encode_call
+from asi.telegram import CALLS, Decoded, decode_call, encode_call
 from asi.telegram_log import HEADER, TelegramLog, to_line, to_record
 from asi.window import Analog, Event, HostWindow, State
 
@@ -453,6 +453,10 @@ LINES = [
      "       1234.567  ADRA 0    00111 -> 0110      21.500  OK             MANAGEMENT"),
     (telegram(encode_call("WID1", 0, 15), phase=Phase.MANAGEMENT),
      "       1234.567  WID1 0    1111  -> 0000      21.500  OK             MANAGEMENT"),
+    (telegram(encode_call("WID1", 0, 0), phase=Phase.MANAGEMENT),
+     "       1234.567  WID1 0    0000  -> 0000      21.500  OK             MANAGEMENT"),
+    (telegram(0b1_00101_10111, data=4, phase=Phase.MANAGEMENT),
+     "       1234.567  R1   5B         -> 0100      21.500  OK             MANAGEMENT"),
     (telegram(encode_call("BR01"), delay=-1, phase=Phase.OFFLINE),
      "       1234.567  BR01 all        -> -                 OK             OFFLINE"),
     (telegram(encode_call("RID1", 31 + 32), ErrorClass.LENGTH, ok=0, t=0, phase=Phase.DETECTION),
@@ -472,6 +476,23 @@ def test_log_columns_stand_below_their_names():
     for name, text in (("call", "DEXG"), ("addr", "17A"), ("data", "101"), ("class", "PARITY"), ("phase", "DATA_EXCH"),
                        ("remark", "repeated")):
         assert HEADER.index(name) == line.index(text)
+
+
+def test_calls_decode_to_what_they_encode():
+    """CA-003, CA-004, PL-003: every word with a name is the word of that name; R1 carries ~Sel; WID1 0 is not DELA."""
+    named = {}
+    for call in range(2048):
+        for extended in (False, True):
+            out = decode_call(call, lambda number: extended)
+            if out.name != "?":
+                assert encode_call(out.name, out.index or 0, out.data or 0, extended) == call, (call, out)
+                named.setdefault(out.name, set()).add(call)
+    assert named.keys() == set(CALLS) and 1 << 10 not in named["DELA"]
+    # all numbers with both selects; BR01 and PRGM have words of their own
+    assert {name: len(named[name]) for name in ("R1", "RDST", "RDIO", "DELA", "WID1")} == {
+        "R1": 64, "RDST": 64, "RDIO": 64, "DELA": 62, "WID1": 16}
+    assert [decode_call(encode_call("R1", index)) for index in (0, 5, 37)] == [
+        Decoded("R1", 0, None), Decoded("R1", 5, None), Decoded("R1", 37, None)]
 
 
 @given(st.integers(0, 2047), st.sampled_from(ErrorClass), st.integers(0, 15), st.booleans())
@@ -496,15 +517,15 @@ def test_both_logs_have_every_telegram(tmp_path):
     """PL-003: both files have one line per telegram, also when they come in pieces; or only counts."""
     telegrams = [record for record, _ in LINES]
     with TelegramLog(tmp_path, lambda number: False) as log:
-        assert log.add(telegrams[:3]) == 3 and log.add([]) == 0 and log.add(telegrams[3:]) == 5
+        assert log.add(telegrams[:3]) == 3 and log.add([]) == 0 and log.add(telegrams[3:]) == 7
     text = (tmp_path / "telegrams.log").read_text().splitlines()
     records = [json.loads(line) for line in (tmp_path / "telegrams.jsonl").read_text().splitlines()]
-    assert text[0] + "\n" == HEADER and text[1:] == [to_line(record) for record in records] and len(records) == 8
+    assert text[0] + "\n" == HEADER and text[1:] == [to_line(record) for record in records] and len(records) == 10
     with TelegramLog(None, lambda number: False) as quiet:
         quiet.add(telegrams)
     assert quiet.counts == log.counts
-    assert (log.counts.total.requests, log.counts.total.failed, log.counts.total.repeated) == (8, 3, 1)
-    assert log.counts.broken_requests == 1 and log.counts.by_class["OK"] == 5
+    assert (log.counts.total.requests, log.counts.total.failed, log.counts.total.repeated) == (10, 3, 1)
+    assert log.counts.broken_requests == 1 and log.counts.by_class["OK"] == 7
 
 
 def test_numbers_outside_the_map_are_shown():

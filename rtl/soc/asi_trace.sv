@@ -78,14 +78,11 @@ module asi_trace
       sel         = known && !info[3];
       has_data    = 1'b1;
     end else if (number == 5'd0 && !info[4]) begin
-      out.name = info == 5'd0 ? "DELA" : "WID1";
-      if (info != 5'd0) out.data = bits_text(info, 3'd4);
+      out.name = "WID1"; out.data = bits_text(info, 3'd4);
     end else if (number == 5'd31 && info == 5'b10101) begin
       out.name = "BR01"; out.no_answer = 1'b1;
     end else if (number == 5'd0 && info == 5'b11101) begin
       out.name = "PRGM"; out.no_answer = 1'b1;
-    end else if (info == 5'b11111) begin
-      out.name = "R1  ";
     end else begin
       sel = info[3];
       unique case ({info[4], info[2:0]})
@@ -96,6 +93,7 @@ module asi_trace
         4'b1011: out.name = "RID2";
         4'b1100: begin out.name = "RES "; sel = !info[3]; end
         4'b1110: begin out.name = "RDST"; sel = !info[3]; end
+        4'b1111: begin out.name = "R1  "; sel = !info[3]; end
         default: sel = 1'b0;
       endcase
     end

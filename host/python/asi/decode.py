@@ -23,7 +23,7 @@ START_NS = 1_000_000        # later than this after the start a bad request is o
 CYCLE_SILENCE_NS = 10_000_000  # a longer silence is no part of a cycle
 EXTRA_CALLS = 2             # in one cycle, beside DEXG
 CYCLE_CALLS = 70            # so many calls without the lowest address: it is no longer called
-_SEL_CALLS = ("RDIO", "RDID", "RID1", "RID2", "RDST", "RES", "DELA")
+_SEL_CALLS = ("RDIO", "RDID", "RID1", "RID2", "RDST", "RES", "DELA", "R1")
 
 
 class Extended:

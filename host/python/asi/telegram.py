@@ -14,8 +14,9 @@ BIT_NS = 2 * HALF_BIT_NS
 _PATTERNS = (
     ("DEXG", 0, "0xddd"), ("WPAR", 0, "1xddd"), ("DELA", 1, "0s000"), ("RES", 1, "1n100"), ("RDIO", 1, "1s000"),
     ("RDID", 1, "1s001"), ("RID1", 1, "1s010"), ("RID2", 1, "1s011"), ("RDST", 1, "1n110"),
+    ("R1", 1, "1n111"),
 )
-CALLS = tuple(p[0] for p in _PATTERNS) + ("ADRA", "WID1", "BR01", "PRGM", "R1")
+CALLS = tuple(p[0] for p in _PATTERNS) + ("ADRA", "WID1", "BR01", "PRGM")
 
 
 def index_name(index):
@@ -67,8 +68,6 @@ def encode_call(name, index=0, data=0, extended=False):
         return 1 << 10 | 31 << 5 | 0b10101
     if name == "PRGM":
         return 1 << 10 | 0b11101
-    if name == "R1":
-        return 1 << 10 | number << 5 | 0b11111
     for mnemonic, control, pattern in _PATTERNS:
         if mnemonic == name:
             break
@@ -91,18 +90,19 @@ class Decoded:
 
 
 def decode_call(call, extended=lambda number: False):
-    """11-bit call -> Decoded. extended(number): True when that number is known to use A/B addressing."""
+    """11-bit call -> Decoded. extended(number): True when that number is known to use A/B addressing.
+
+    DELA to address 0 and WID1 with the code 0 are one word; nobody deletes address 0, so it is WID1.
+    """
     control, number, info = call >> 10 & 1, call >> 5 & 31, call & 31
     if number == 0 and not control:
         return Decoded("ADRA", 0, info)
     if control and number == 0 and not info & 16:
-        return Decoded("DELA", 0, None) if info == 0 else Decoded("WID1", 0, info & 15)
+        return Decoded("WID1", 0, info & 15)
     if control and number == 31 and info == 0b10101:
         return Decoded("BR01", None, None)
     if control and number == 0 and info == 0b11101:
         return Decoded("PRGM", None, None)
-    if control and info == 0b11111:
-        return Decoded("R1", number, None)
     if not control:
         name = "WPAR" if info & 16 else "DEXG"
         if extended(number):
