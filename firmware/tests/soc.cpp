@@ -87,8 +87,8 @@ void reg_write(uint32_t offset, uint32_t data) {
     }
 }
 
-/// published state, FLAGS to IN_IMG, CDI to PECHO without PCD and PP, combined transactions, history and log, may change
-/// only while IN_SEQ is odd; 16-bit values only as a whole
+/// Published state, FLAGS to IN_IMG, CDI to PECHO without PCD and PP, combined transactions, history and log, may
+/// change only while IN_SEQ is odd; 16-bit values only as a whole.
 void check_published(uint32_t offset, uint32_t be) {
     const bool lists = offset >= offsetof(asi_host_t, FLAGS) && offset < offsetof(asi_host_t, IN_SEQ);
     const bool image = offset >= offsetof(asi_host_t, IN_IMG) && offset < offsetof(asi_host_t, OUT_IMG);
@@ -97,7 +97,8 @@ void check_published(uint32_t offset, uint32_t be) {
     const bool analog = offset >= offsetof(asi_host_t, AIDI) && offset < offsetof(asi_host_t, AODI);
     const bool combined = offset >= offsetof(asi_host_t, CTT_STATE) && offset < offsetof(asi_host_t, AIDI);
     const bool safe = offset >= offsetof(asi_host_t, SAFE_IN) && offset < offsetof(asi_host_t, FN_SEQ);
-    const bool history = offset >= offsetof(asi_host_t, CHANGED_SLAVES) && offset < offsetof(asi_host_t, STAT);
+    const bool history = (offset >= offsetof(asi_host_t, CHANGED_SLAVES) && offset <= offsetof(asi_host_t, LOG_HEAD)) ||
+                         (offset >= offsetof(asi_host_t, LOG) && offset < offsetof(asi_host_t, STAT));
     const bool open = window[offsetof(asi_host_t, MAGIC) / 4] != 0;
     if (!open) return;
     if ((lists || image || codes || analog || combined || safe || history) &&
