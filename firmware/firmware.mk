@@ -39,24 +39,25 @@ firmware-coverage: $(VENV)/.ready  ## native firmware tests with line and branch
 	@FW_COVERAGE=1 $(VPY) -m pytest firmware/tests -k 'not image'
 	@cd $(FW)/native && gcov -b -n libasi_branches*.gcda | grep -A3 "File.*firmware/core"
 	@echo "the engines of the combined transactions, in the library of their own tests (type 4 is off in the first):"
-	@cd $(FW)/native && for f in libasi_ctt_branches.*-asi_ctt*.gcda libasi_ctt_branches-ctt4_enable_1.*-asi_ctt4.gcda; do \
+	@cd $(FW)/native && for f in libasi_ctt_branches.*-asi_ctt*.gcda \
+	    libasi_ctt_branches-ctt4_enable_1.*-asi_ctt4.gcda; do \
 	  gcov -b -n $$f | grep -A3 "File.*firmware/core/asi_ctt[0-9]*\.c"; done
 
 CYCLES ?= 1000000
 SEEDS  ?= 1 2 3 4
 .PHONY: soak
-soak: $(VENV)/.ready  ## core against its reference for CYCLES=1000000 random cycles, SEEDS='1 2 3 4' in parallel (minutes)
+soak: $(VENV)/.ready  ## core against its reference: CYCLES=1000000 random cycles, SEEDS='1 2 3 4' in parallel (minutes)
 	@$(VPY) firmware/tests/soak.py --cycles $(CYCLES) --seeds $(SEEDS)
 
 FUZZ_CC  ?= clang
 FUZZ_TIME ?= 60
 FUZZ_SRC := $(filter-out %/asi_store.c,$(wildcard firmware/core/*.c)) firmware/tests/native.c firmware/tests/fuzz.c
 .PHONY: fuzz
-fuzz:  ## coverage-guided fuzzing of the core for FUZZ_TIME=60 s (needs clang with libFuzzer); finds in build/firmware/fuzz
+fuzz:  ## fuzz the core by coverage for FUZZ_TIME=60 s (needs clang with libFuzzer); finds in build/firmware/fuzz
 	@command -v $(FUZZ_CC) > /dev/null || { echo "make fuzz needs clang with libFuzzer (Debian: clang); FUZZ_CC=... \
 	  names another. The corpus runs without it: make pytest ARGS=firmware/tests/test_fuzz.py"; exit 1; }
 	@mkdir -p $(FW)/fuzz/corpus $(FW)/fuzz/found
 	@$(FUZZ_CC) -std=c17 -g -O1 -DFUZZ_LIBFUZZER -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
 	  -Ifirmware/core -Ifirmware/generated $(FUZZ_SRC) -o $(FW)/fuzz/fuzz
-	@cd $(FW)/fuzz && ./fuzz -max_total_time=$(FUZZ_TIME) -max_len=600 -len_control=0 -print_final_stats=1 -artifact_prefix=found/ \
-	  corpus $(CURDIR)/firmware/tests/corpus
+	@cd $(FW)/fuzz && ./fuzz -max_total_time=$(FUZZ_TIME) -max_len=600 -len_control=0 -print_final_stats=1 \
+	  -artifact_prefix=found/ corpus $(CURDIR)/firmware/tests/corpus

@@ -9,12 +9,6 @@
 
 #include "asi_ctt_table.h"
 
-// S-7.1, S-7.2: triples of a value, which has no E triple there; for a table without these rows
-#ifndef ASI_CTT1_TRIPLES_71
-#define ASI_CTT1_TRIPLES_71 5
-#define ASI_CTT1_TRIPLES_72 6
-#endif
-
 namespace asi {
 namespace {
 
@@ -49,8 +43,8 @@ int copy(const std::vector<uint8_t> &from, uint8_t *to, unsigned max) {
 // A call whose control bit has been served already takes nothing and begins nothing; it is answered all the same.
 class Ctt1 : public Transaction {
 public:
-    // triples: of a value; less than 7: no E triple, the value left-aligned in what is there. strings: by the parameter
-    // that S-7.4 leaves to the master. supervised: P0 = 1 means that outputs drop when the dialogue stops (S-7.3).
+    // triples: of a value with its E triple; less than 7: the value left-aligned in what is there. strings: by the
+    // parameter that S-7.4 leaves to the master. supervised: P0 = 1 drops outputs when the dialogue stops (S-7.3).
     Ctt1(bool inputs, unsigned channels, unsigned triples, bool strings, bool supervised)
         : inputs_(inputs), channels_(channels), triples_(triples), strings_(strings), supervised_(supervised) {
         reset();
@@ -135,8 +129,8 @@ private:
     static unsigned channel_of(unsigned e) { return ASI_CTT1_E_REVERSED ? reversed(e) : e; }
     bool receiving() const { return mode_ == Mode::kWrite || (mode_ == Mode::kData && !inputs_); }
     unsigned top() const { return (mode_ == Mode::kData ? triples_ : ASI_CTT1_SEQUENCE_TRIPLES) - 1; }
-    bool has_e() const { return triples_ == ASI_CTT1_VALUE_TRIPLES; }
-    unsigned missing_bits() const { return has_e() ? 0 : 3 * (ASI_CTT1_VALUE_TRIPLES - 1 - triples_); }
+    unsigned e_shift() const { return 3 * (triples_ - 1); }
+    unsigned missing_bits() const { return 3 * (ASI_CTT1_VALUE_TRIPLES - triples_); }
     const std::vector<uint8_t> &text() const {
         return texts_[mode_ == Mode::kId ? 0 : mode_ == Mode::kDiagnosis ? 1 : 2];
     }
@@ -173,8 +167,8 @@ private:
     }
     unsigned value_frame(unsigned channel) const {
         const bool valid = !(invalid_ >> channel & 1), overflow = overflow_ >> channel & 1;
-        const unsigned e = has_e() ? channel_of(channel) << 18 : 0;
-        return e | values_[channel] >> missing_bits() << 2 | (overflow ? kO : 0) | (valid ? kV : 0);
+        const unsigned head = channel_of(channel) << e_shift() | values_[channel] >> missing_bits() << 2;
+        return head | (overflow ? kO : 0) | (valid ? kV : 0);
     }
     unsigned sequences() const { return static_cast<unsigned>(text().size()) / 3; }
     unsigned sequence_frame(unsigned n) const {
@@ -193,7 +187,7 @@ private:
         if (mode_ == Mode::kWrite) take_sequence(); else take_value();
     }
     void take_value() {
-        const unsigned channel = has_e() ? channel_of(frame_ >> 18 & 7) : 0;
+        const unsigned channel = channel_of(frame_ >> e_shift() & 7);
         if (!(frame_ & kV) || channel >= channels_) return;
         values_[channel] = static_cast<uint16_t>(frame_ >> 2 << missing_bits());
         have_ |= 1u << channel;
@@ -328,8 +322,9 @@ private:
         }
     }
     void gap() {
-        // only a gap ends a request whose length nobody knows; what is below kRead is cyclic and has no error response
-        if (!in_.empty() && !known(in_[0]) && in_[0] >= kRead) refuse(kNotImplemented);
+        // Only a gap ends a request whose length nobody knows. What is below kRead is cyclic and has no error response,
+        // what begins at kGood is a response itself.
+        if (!in_.empty() && !known(in_[0]) && in_[0] >= kRead && in_[0] < kGood) refuse(kNotImplemented);
         clear();
     }
     void clear() {
@@ -557,11 +552,9 @@ std::unique_ptr<Transaction> Transaction::make(unsigned io, unsigned id, unsigne
         case 1: case 2: case 3: case 4: {
             if (id == 4 && id2 == 0) return nullptr;  // S-7.4 in its 4I/4O mode
             constexpr std::array<uint8_t, 4> kChannels = {1, 2, 4, 4};
-            const bool shorter = id <= 2;
             const unsigned triples = id == 1   ? ASI_CTT1_TRIPLES_71
                                      : id == 2 ? ASI_CTT1_TRIPLES_72 : ASI_CTT1_VALUE_TRIPLES;
-            return std::make_unique<Ctt1>(id2 >> 3 & 1, shorter ? 1 : kChannels[id2 & 3], triples, id == 4,
-                                          id == 3);
+            return std::make_unique<Ctt1>(id2 >> 3 & 1, kChannels[id2 & 3], triples, id == 4, id == 3);
         }
         case 5:
             if (id2 == 5) return std::make_unique<Ctt2>();

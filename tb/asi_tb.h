@@ -96,7 +96,7 @@ typedef struct {
 int      asi_net_log(asi_net *net, asi_telegram *out, int max);                /* drains, -> count; keeps 2^20 */
 
 /* All pulses of requests and answers, good or not, but each first one (it defines the grid): where in a bit time they
-   begin and end. [0 master, 1 slaves][0 negative, 1 positive][bin]: bin 0 begins 1 us before the grid, bins are 25 ns */
+   begin and end. [0 master, 1 slaves][0 negative, 1 positive][bin]: bin 0 begins 1 us before the grid, 25 ns each */
 typedef struct { uint32_t starts[2][2][240], ends[2][2][240]; } asi_pulse_counts;
 void     asi_net_pulse_counts(const asi_net *net, asi_pulse_counts *out);     /* since reset */
 

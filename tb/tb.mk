@@ -49,7 +49,8 @@ $(TB_OUT)/model/unit.cpp: $(TB_RTL) tools/lint.vlt tb/tb.mk $(VENV)/.ready
 # not flattened: the waves keep the hierarchy
 $(TB_OUT)/model_$(TB_WAVE)/unit.cpp: $(TB_RTL) tools/lint.vlt tb/tb.mk $(VENV)/.ready
 	@rm -rf $(@D) && mkdir -p $(@D)
-	$(if $(TB_FST),,@echo "waves will be VCD, several MB per ms; for FST (25 times smaller) install the headers: Debian liblz4-dev zlib1g-dev")
+	$(if $(TB_FST),,@echo "waves will be VCD, several MB per ms; for FST (25 times smaller) install the headers:" \
+	  "Debian liblz4-dev zlib1g-dev")
 	@verilator --quiet-stats $(TB_VFLAGS) --trace-$(TB_WAVE) -Mdir $(@D)
 	@$(TB_UNIT)
 
@@ -57,8 +58,8 @@ $(TB_OUT)/libasi_chip.so: $(TB_OUT)/model/unit.cpp $(TB_VRT) tb/asi_chip.cpp $(T
 	@echo "building $@"
 	@$(TB_CHIP)
 
-$(TB_OUT)/libasi_chip_trace.so: $(TB_OUT)/model_$(TB_WAVE)/unit.cpp $(TB_VRT) $(TB_OUT)/verilated/verilated_$(TB_WAVE)_c.o \
-                                tb/asi_chip.cpp $(TB_SLAVES) $(TB_HEADERS)
+$(TB_OUT)/libasi_chip_trace.so: $(TB_OUT)/model_$(TB_WAVE)/unit.cpp $(TB_VRT) \
+                                $(TB_OUT)/verilated/verilated_$(TB_WAVE)_c.o tb/asi_chip.cpp $(TB_SLAVES) $(TB_HEADERS)
 	@echo "building $@"
 	@$(TB_CHIP) -DVM_TRACE=1 $(if $(TB_FST),-DVM_TRACE_FST=1 -lz -llz4,-DVM_TRACE_VCD=1)
 

@@ -256,12 +256,16 @@ class Chip:
         dut.efault_i.value = 0
         dut.spi_miso_i.value = 0
 
-    async def reset(self, clocks=4):
-        """Reset for some clocks, then wait for the firmware to show itself (at most 50 ms). Reset clears MAGIC."""
+    async def pulse_reset(self, clocks=4):
+        """Reset for some clocks."""
         self.dut.rst_i.value = 1
         for _ in range(clocks):
             await RisingEdge(self.dut.clk_i)
         self.dut.rst_i.value = 0
+
+    async def reset(self):
+        """Reset, then wait for the firmware to show itself (at most 50 ms). Reset clears MAGIC."""
+        await self.pulse_reset()
         await self.host.until(self.host.ready, 50_000, "MAGIC")
 
     def supply(self, good):

@@ -154,22 +154,21 @@ class Receiver:
 class Ctt1(Engine):
     """S-7.1 .. S-7.4: values of 16 bits with channel, overflow and valid, a triple per call; S-7.4 has strings.
 
-    S-7.1 and S-7.2 have one channel, no E triple and 2 .. 6 triples of the left-aligned value, O and V.
+    S-7.1 and S-7.2 have no strings and may have fewer triples: the value is left-aligned in what is there.
     """
 
     def __init__(self, id, id2, triples=None, **common):
         self.is_input = bool(id2 & 8)
         if id in (1, 2):
-            # getattr: the numbers are ours (experimental), 15 and 18 bits where the table does not say
-            self.triples = triples or getattr(table, f"CTT1_TRIPLES_7{id}", 4 + id)
-            self.channels = 1
-            if not 2 <= self.triples <= 6:
-                raise ValueError(f"{self.triples} triples, not 2 .. 6")
+            self.triples = triples or (table.CTT1_TRIPLES_71 if id == 1 else table.CTT1_TRIPLES_72)
+            if not 3 <= self.triples <= table.CTT1_VALUE_TRIPLES:
+                raise ValueError(f"{self.triples} triples, not 3 .. {table.CTT1_VALUE_TRIPLES}")
         elif triples is not None:
             raise ValueError(f"triples: S-7.{id} has {table.CTT1_VALUE_TRIPLES}")
         else:
-            self.triples, self.channels = table.CTT1_VALUE_TRIPLES, (1, 2, 4, 4)[id2 & 3]
-        self._unused = max(18 - 3 * self.triples, 0)            # low bits of a value that a short frame does not carry
+            self.triples = table.CTT1_VALUE_TRIPLES
+        self.channels = (1, 2, 4, 4)[id2 & 3]
+        self._unused = 3 * (table.CTT1_VALUE_TRIPLES - self.triples)    # low bits that a short frame does not carry
         self._has_strings, self._supervises = id == 4, id == 3 and not self.is_input
         super().__init__(**common)
 
@@ -227,10 +226,10 @@ class Ctt1(Engine):
         channel = k % self.channels
         data = self.values[channel] & 0xFFFF
         good, over = not self.invalid >> channel & 1, self.overflow >> channel & 1
-        return _channel(channel) << 18 | data >> self._unused << 2 | over << 1 | good
+        return _channel(channel) << 3 * (self.triples - 1) | data >> self._unused << 2 | over << 1 | good
 
     def _take_value(self, frame):
-        channel = _channel(frame >> 18)                                 # 0 where there is no E triple
+        channel = _channel(frame >> 3 * (self.triples - 1))
         if frame & 1 and channel < self.channels:                       # V
             data = frame >> 2 & 0xFFFF >> self._unused
             self.outputs[channel] = data << self._unused
@@ -243,12 +242,15 @@ class Ctt1(Engine):
         return frames or [0]
 
     def _take_sequence(self, frame):
-        if not frame & 1 or len(self._written) + 3 > table.CTT1_STRING_BYTES:
+        if not frame & 1:
             self._written = b""                                         # nobody can be told: the old string stays
             return
-        self._written += frame.to_bytes(3)
+        # a string that is too long is dropped to its end, not taken from there on
+        self._written = self._written[:table.CTT1_STRING_BYTES] + frame.to_bytes(3)
         if not frame & 2:
-            self.strings[PARAMETERS], self._written = self._written, b""
+            if len(self._written) <= table.CTT1_STRING_BYTES:
+                self.strings[PARAMETERS] = self._written
+            self._written = b""
 
 
 # ---------------------------------------------------------------------------------------------- CTT2
@@ -301,8 +303,8 @@ class Ctt2(Engine):
                 self._message += bytes((int(bits, 2),))
                 self._examine()
         if self._still == table.CTT2_GAP_CALLS:
-            if self._message and self._message[0] >= READ and self._needs() is None:
-                self._refuse(NOT_IMPLEMENTED)       # of an unknown length: the gap is its end
+            if self._message and READ <= self._message[0] < GOOD and self._needs() is None:
+                self._refuse(NOT_IMPLEMENTED)       # of an unknown length: the gap is its end; from 40 on: a response
             self._bits, self._message = "", b""
 
     def _send(self, message):
@@ -374,7 +376,7 @@ class Ctt2(Engine):
 
     def _refuse(self, error):
         code = self._message[0]
-        self._send(bytes((code + REFUSED & 0xFF, error)) + self.device_error * (code in (DEVICE_READ, DEVICE_WRITE)))
+        self._send(bytes((code + REFUSED, error)) + self.device_error * (code in (DEVICE_READ, DEVICE_WRITE)))
 
 
 # ---------------------------------------------------------------------------------------------- CTT3

@@ -63,6 +63,7 @@ class Slave:
         self.requests = self.answers = 0
         self._memory = (self.number, self.id1)      # non-volatile address and ID1
         self._memory_ok = self._write_good = True
+        self._spoilt = None                         # (io, id, ctt) while a half written memory hides them
         self._writing_until = -1
         self._defaults(NEVER)
 
@@ -104,13 +105,13 @@ class Slave:
         self._defaults(t_ns + POWER_UP_NS)
 
     def power_down(self, t_ns):
-        """The supply goes; a running memory write is spoilt."""
+        """The supply goes; a running memory write is spoilt, until another one goes well."""
         self.update(t_ns)
         if self.present and t_ns < self._writing_until:
             self._memory = (0, self._memory[1])
             self._memory_ok = False
-            self.io = self.id = 0xF
-            self.ctt = None
+            self._spoilt = self._spoilt or (self.io, self.id, self.ctt)
+            self.io, self.id, self.ctt = 0xF, 0xF, None
         self._writing_until = -1
         self.present = False
 
@@ -118,6 +119,10 @@ class Slave:
         """Let time-outs up to t_ns happen."""
         if 0 <= self._writing_until <= t_ns:
             self._memory_ok = self._write_good      # S3 tells of the last write
+            if self._memory_ok and self._spoilt:
+                (self.io, self.id, self.ctt), self._spoilt = self._spoilt, None
+                if self.ctt:
+                    self.ctt.reset()
         if self.ctt and self.present:
             self.ctt.update(t_ns)
         while self.watchdog and self.number and self.present:

@@ -79,8 +79,9 @@ def test_options_of_plain_slaves():
         ctt.make(7, 3, 12, swapped=True)
     with pytest.raises(ValueError, match="7 words"):
         ctt.make(0, 11, 0, words=range(7))
-    with pytest.raises(ValueError, match="7 triples"):
-        ctt.make(7, 1, 8, triples=7)
+    for triples in (2, 8):
+        with pytest.raises(ValueError, match=f"{triples} triples"):
+            ctt.make(7, 1, 8, triples=triples)
     with pytest.raises(ValueError, match="S-7.3 has 7"):
         ctt.make(7, 3, 8, triples=6)
 
@@ -316,10 +317,11 @@ def test_ctt1_value_is_taken_whole():
     for t in (6, 5, 4):
         master.step(t)
     assert master.read(7) == 0x0FF0 << 2 | 1                    # ... of the same channel
-    short = ctt.make(7, 1, 8, values=(0xE000,))
-    assert short.exchange(0b0100, 0) == 0b0111
+    short = ctt.make(7, 1, 8, values=(0xE000,), triples=5)
+    assert short.exchange(0b0100, 0) == 0b0000
     short.values[0] = 0
-    assert short.exchange(0b0100, REPEAT_NS) == 0b0111          # the first triple repeated is no new value
+    assert short.exchange(0b0100, REPEAT_NS) == 0b0000          # the first triple repeated is no new value
+    assert short.exchange(0b1011, CYCLE_NS) == 0b1111
 
 
 def test_ctt1_outputs_that_are_not_taken():
@@ -342,20 +344,21 @@ def test_ctt1_before_the_first_triple():
 
 
 @pytest.mark.parametrize("alternative", [{}, {"CTT1_COUNT_UP": 1}])
-@pytest.mark.parametrize("triples", [2, 3, 4, 5, 6])
+@pytest.mark.parametrize("triples", [3, 4, 5, 6, 7])
 def test_ctt1_short_values(triples, alternative):
-    """SL-009, CT-015: S-7.1 and S-7.2: no E triple, one channel, the value left-aligned in what there is."""
-    with choices(**alternative):
-        left = 18 - 3 * triples
-        engine = ctt.make(7, 1, 0xE, values=(0xA5C3, 0x1111), triples=triples)
+    """SL-009, CT-015: S-7.1 and S-7.2: E and channels as S-7.3, the value left-aligned in fewer triples."""
+    with choices(CTT1_TRIPLES_71=triples, **alternative):
+        left, e = 21 - 3 * triples, 3 * (triples - 1)
+        engine = ctt.make(7, 1, 0xD, values=(0xA5C3, 0xFFFF))
         master = Ctt1Master(Wire(engine))
         for _ in range(2):
             assert master.read(triples) == 0xA5C3 >> left << 2 | 1
-        engine = ctt.make(7, 2, 2, triples=triples)
+            assert master.read(triples) == 1 << e | 0xFFFF >> left << 2 | 1
+        engine = ctt.make(7, 2, 1, triples=triples)
         engine.exchange(15, 0)
         wire = Wire(engine)
-        assert Ctt1Master(wire).write(0xA5C3 >> left << 2 | 1, triples) == triples
-        assert engine.outputs == [0xA5C3 >> left << left, None, None, None]
+        assert Ctt1Master(wire).write(1 << e | 0xA5C3 >> left << 2 | 1, triples) == triples
+        assert engine.outputs == [None, 0xA5C3 >> left << left, None, None]
         assert engine.write_parameter(table.CTT1_PAR_ID, 0) == table.CTT1_PAR_ID        # no strings here
         Ctt1Master(wire).write(0x1234 >> left << 2 | 1, triples)
         assert engine.outputs[0] == 0x1234 >> left << left
@@ -545,11 +548,12 @@ CTT2_CHOICES = [{}, {"CTT2_MSB_FIRST": 0}, {"CTT2_RISING_EDGE": 0}, {"CTT2_IDLE"
     ("11 00 05 41 42 43 44 45", "91 01"), ("11 05 00", "91 02"), ("13 05 05 41 42 43 44 45", "53"),
     ("13 06 01 00", "93 01"), ("1D 05 02 05 41 42 43 44 45", "5D 41 42"), ("1D 05 06 05 41 42 43 44 45", "9D 02"),
     ("1D 05 00 05 41 42 43 44 45", "5D"), ("1D 05 05 00", "9D 02"), ("1D 08 01 01 00", "9D 01"),
-    ("00", "AB CD"), ("01 12 34", ""), ("1F 01 02 03", "9F 03"), ("77", "F7 03"),
-    ("05 05", "")])
+    ("00", "AB CD"), ("01 12 34", ""), ("1F 01 02 03", "9F 03"), ("3F", "BF 03"),
+    ("40", ""), ("77 01", ""), ("90 02", ""), ("FF", ""), ("05 05", "")])
 @pytest.mark.parametrize("codes", CTT2)
 def test_ctt2_messages(codes, message, response):
-    """SL-009, CT-021: every code of the table with its good response and its errors; unknown codes end with a gap."""
+    """SL-009, CT-021: every code of the table with its good response and its errors; unknown codes end with a gap, and
+    what looks like a response (40 and above) has none."""
     engine = ctt.make(*codes, values=(0xABCD,), strings=OBJECTS)
     master = Ctt2Master(Wire(engine))
     assert master.ask(bytes.fromhex(message), 8) == bytes.fromhex(response)

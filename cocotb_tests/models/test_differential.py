@@ -234,18 +234,36 @@ def test_life():
     assert pair.call("RDST", 1)
 
 
-def test_power_fail_while_writing():
-    """SL-007, SL-005: a spoilt memory looks the same in both models."""
-    pair = Pair(dict(address=0, io=3, id=5))
+@pytest.mark.parametrize("config", [dict(io=3, id=5), dict(io=7, id=0xA, id1=0xF, id2=0xE),
+                                    dict(io=7, id=3, id2=0xC, values=(0x1234,)), dict(io=7, id=0xB)])
+@pytest.mark.parametrize("times", [1, 2])
+def test_power_fail_while_writing(config, times):
+    """SL-007, SL-005: a spoilt memory looks the same in both models, and so does the slave once a new ADRA went well:
+    its codes, its select and its transaction are back."""
+    pair = Pair(dict(address=0, **config))
     pair.wait(POWER_UP_NS + CLEAR_NS)
+
+    def all_reads(number):
+        return [bool(pair.call(name, index)) for index in (0, 32, number, number + 32)
+                for name in ("RDIO", "RDID", "RDST", "RID1", "RID2")]
+    whole = all_reads(7)
+    for _ in range(times):
+        pair.call("ADRA", data=7)
+        pair.wait(2 * MS)
+        assert any(all_reads(7))
+        pair.power(False)
+        pair.wait(MS)
+        pair.power(True)
+        pair.wait(POWER_UP_NS + CLEAR_NS)
+        assert sum(all_reads(7)) == 5
     pair.call("ADRA", data=7)
-    pair.wait(2 * MS)
-    pair.power(False)
-    pair.wait(MS)
-    pair.power(True)
-    pair.wait(POWER_UP_NS + CLEAR_NS)
-    for name in ("RDIO", "RDID", "RDST", "RID1"):
-        assert pair.call(name, 0)
+    all_reads(7)
+    pair.wait(WRITE_NS + CLEAR_NS)
+    assert sum(all_reads(7)) == sum(whole)
+    sel, extended = config.get("id1", 0) >> 3, config["id"] == 0xA
+    assert pair.call("WPAR", 7 + 32 * sel, 7, extended=extended)
+    for nibble in (6, 13, 4, 11, 2, 9, 0) * 2:
+        assert pair.call("DEXG", 7 + 32 * sel, nibble, extended=extended)
 
 
 def test_watchdog():
@@ -425,7 +443,7 @@ def transacting():
         dict(address=1, io=7, id=3, id2=0xD, values=(0x1234, 0x8001)), dict(address=2, io=7, id=3, id2=6),
         dict(address=3, io=7, id=4, id2=0xC, values=(0x7FFF,), strings={0: STRING, 1: STRING[3:6]}),
         dict(address=4, io=7, id=4, id2=5, strings={2: STRING}),
-        dict(address=5, io=7, id=1, id2=8, values=(0xABCD,)), dict(address=6, io=7, id=2, id2=0),
+        dict(address=5, io=7, id=1, id2=9, values=(0xABCD, 0x5432)), dict(address=6, io=7, id=2, id2=1),
         dict(address=7, io=7, id=5, id2=5, values=(1, 2, 3, 4), strings={0: ID_OBJECT, 3: b"abcd"}, inputs=2),
         dict(address=8, io=7, id=0xA, id1=7, id2=5, inputs=1),
         dict(address=40, io=0xB, id=0xA, id1=7, id2=5, strings={0: ID_OBJECT, 3: b"xy"}, swapped=True, busy=1),
@@ -522,10 +540,9 @@ def test_random_ctt1(data):
         talk, k = talks[index], INDICES.index(index)
         what = draw(st.sampled_from(("value",) * 4 + ("string", "set", "invalid", "parameter", "silence", "reset")))
         if what == "value" and index in (1, 3, 5, 15):
-            talk.triples(range(4 if index == 5 else 6, -1, -1))
+            talk.triples(range(6, -1, -1))
         elif what == "value":
-            bits = 18 if index == 6 else 21
-            talk.frame(draw(st.integers(0, (1 << bits) - 1)) & ~(4 << 18) | draw(st.integers(0, 1)), bits // 3 - 1)
+            talk.frame(draw(st.integers(0, (1 << 21) - 1)) & ~(4 << 18) | draw(st.integers(0, 1)), 6)
         elif what == "string" and index in (3, 4):
             mode = draw(st.sampled_from(MODES))
             pair.call("WPAR", index, mode)
@@ -554,10 +571,33 @@ def test_random_ctt1(data):
             pair.call("WPAR", index, 15)
 
 
+@pytest.mark.parametrize("sequences", [73, 74, 75, 148])
+def test_string_that_is_too_long(sequences):
+    """SL-007, SL-009, CT-014: 73 sequences are taken, more are dropped to the last; the old string stays, the next one
+    is taken again."""
+    pair = Pair(dict(address=4, io=7, id=4, id2=5, strings={2: STRING}))
+    pair.wait(POWER_UP_NS + CLEAR_NS)
+    k, control = 0, 0
+
+    def write(frames):
+        nonlocal control
+        pair.call("WPAR", 4, table.CTT1_PAR_WR)
+        for number, frame in enumerate(frames):
+            frame = frame << 8 | (1 if number == len(frames) - 1 else 3)
+            for n in range(7, -1, -1):
+                pair.call("DEXG", 4, control << 3 | frame >> 3 * n & 7)
+                control ^= 1
+        pair.call("WPAR", 4, table.CTT1_PAR_DATA)
+        return pair.slaves[k].ctt.strings[2]
+
+    assert len(write(range(sequences))) == (219 if sequences == 73 else len(STRING))
+    assert write((0xA5A5, 0x1234)) == bytes.fromhex("A5A503123401")
+
+
 MESSAGES = ((0x00,), (0x01, 0x5A, 0xA5), (0x01, 1, 2, 3, 4), (0x10, 0, 5), (0x10, 0, 6), (0x10, 0, 7), (0x10, 3, 2),
             (0x10, 9, 1), (0x11, 3, 4, 1, 2, 3, 4), (0x11, 3, 2, 8, 9), (0x11, 0, 5, 1, 2, 3, 4, 5), (0x12, 3, 1),
             (0x13, 3, 2, 6, 7), (0x1D, 3, 2, 2, 4, 5), (0x1D, 3, 4, 4, 9, 8, 7, 6), (0x1D, 3, 9, 1, 4), (0x14, 1),
-            (0x10,), (0x50, 3), (0x90, 1), (0x02,))
+            (0x10,), (0x3F,), (0x40,), (0x50, 3), (0x90, 1), (0xFF,), (0x02,))
 
 
 @given(st.data())

@@ -166,7 +166,7 @@ def test_kinds():
 
     for id_code in (1, 2, 3, 4):
         assert can("set_value", 0, 1, io=7, id=id_code, id2=0xE) and not can("value", 0, io=7, id=id_code, id2=0xE)
-        assert can("set_value", 1, 1, io=7, id=id_code, id2=0xE) == (id_code > 2)
+        assert [can("set_value", 3, 1, io=7, id=id_code, id2=id2) for id2 in (0xC, 0xD, 0xE)] == [False, False, True]
         assert can("value", 0, io=7, id=id_code, id2=4) and not can("set_value", 0, 1, io=7, id=id_code, id2=4)
         assert not can("set_value", 0, 1, io=6, id=id_code, id2=0xC)
     for id2, channels in ((0xC, 1), (0xD, 2), (0xE, 4), (0xF, 4), (8, 1)):
@@ -263,18 +263,19 @@ def test_input_restart():
     assert m.read_value()[0] == 0
 
 
-@pytest.mark.parametrize("id_code, triples", [(1, 5), (2, 6)])
+@pytest.mark.parametrize("id_code, triples", [(1, table.CTT1_TRIPLES_71), (2, table.CTT1_TRIPLES_72)])
 def test_shorter_values(id_code, triples):
-    """SL-009, CT-015: S-7.1 and S-7.2 have one channel, no E triple and fewer triples, left-aligned."""
-    assert getattr(table, f"CTT1_TRIPLES_7{id_code}", triples) == triples
-    bits = 3 * triples - 2
-    m = Master(8, io=7, id=id_code, id2=0xA)
+    """SL-009, CT-015: S-7.1 and S-7.2 have the E triple and the channels of S-7.3; the table tells how many triples."""
+    left, e = 21 - 3 * triples, 3 * (triples - 1)
+    m = Master(8, io=7, id=id_code, id2=0xD)
     m.net.set_value(m.slave, 0, 0xABCD)
+    m.net.set_value(m.slave, 1, 0xFFFF)
     for _ in range(2):
-        assert m.read(triples - 1) == 0xABCD >> 16 - bits << 2 | 1
-    m = Master(8, io=7, id=id_code, id2=2)
-    assert m.write(0xABCD >> 16 - bits << 2 | 1, triples - 1) == [*range(triples - 2, -1, -1), triples - 1]
-    assert m.net.value(m.slave) == 0xABCD & ~((1 << 16 - bits) - 1)
+        assert m.read(triples - 1) == 0xABCD >> left << 2 | 1
+        assert m.read(triples - 1) == 1 << e | 0xFFFF >> left << 2 | 1
+    m = Master(8, io=7, id=id_code, id2=1)
+    assert m.write(1 << e | 0xABCD >> left << 2 | 1, triples - 1) == [*range(triples - 2, -1, -1), triples - 1]
+    assert m.net.value(m.slave, 1) == 0xABCD >> left << left and m.net.value(m.slave, 0) is None
 
 
 @pytest.mark.parametrize("loss", ["answer", "request", "repetition"])
@@ -482,7 +483,8 @@ def test_ctt2_messages(option):
             ((0x13, 9, 1, 9), b"\x93\x01"), ((0x11, 3, 5, 1, 2, 3, 4, 5), b"\x91\x02"),
             ((0x11, 3, 3, 1, 2, 3), b"\x91\x02"), ((0x1D, 3, 3, 4, *b"CBcd"), b"\x5DCBc"),
             ((0x1D, 3, 0, 4, *b"CBcd"), b"\x5D"), ((0x1D, 9, 1, 1, 0), b"\x9D\x01"), ((0x1D, 3, 5, 0), b"\x9D\x02"),
-            ((0x14, 3), b"\x94\x03"), ((0x1F,), b"\x9F\x03"), ((0x50,), b"\xD0\x03"), ((0x02,), b"")):
+            ((0x14, 3), b"\x94\x03"), ((0x1F,), b"\x9F\x03"), ((0x3F,), b"\xBF\x03"), ((0x40,), b""),
+            ((0x50,), b""), ((0x90, 2), b""), ((0xFF,), b""), ((0x02,), b"")):
         assert m.message(*message, answer=len(answer) + 1, **option) == answer, message
     assert m.net.string(m.slave, 3) == b"CBcd"
 

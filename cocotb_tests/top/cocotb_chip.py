@@ -19,9 +19,10 @@ MS = 1_000_000
 
 
 async def play(dut, name):
+    """A plant with all its actions, functions and checks. Nobody else sends: no request on the line may be bad."""
     player = Player(dut, load_plant(PLANTS / f"{name}.toml").with_settle(SETTLE_NS))
-    await player.start()
-    await player.run()
+    await player.play()
+    assert player.log.counts.total.requests and not player.log.counts.broken_requests
     return player
 
 
@@ -65,6 +66,18 @@ async def plant_packaging(dut):
 async def plant_faults(dut):
     """PL-004, EX-015, EX-012, EX-013, EX-021: drop-out and return, noise, a short dip and a power failure."""
     await play(dut, "faults")
+
+
+@cocotb.test(timeout_time=2_500, timeout_unit="ms")
+async def plant_combined(dut):
+    """PL-004, SL-009, CT-001: values, strings, messages and safety words of every kind of slave, both ways."""
+    await play(dut, "combined")
+
+
+@cocotb.test(timeout_time=2_500, timeout_unit="ms")
+async def plant_replacement(dut):
+    """PL-004, FN-020: change_address, parameters and automatic addressing of a replaced slave."""
+    await play(dut, "replacement")
 
 
 @cocotb.test(timeout_time=300, timeout_unit="ms")

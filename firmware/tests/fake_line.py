@@ -217,7 +217,8 @@ class Master:
         self.books = [[0, 0, 0] for _ in range(64)]  # attempts: good, silent, garbled
         lps, pcd, pp = self.projected
         wanted = dict(data_exchange=True, protected_mode=False, auto_address=False, auto_clear=0) | controls
-        self.init_status = self.lib.fw_init(self.ffi.new("fw_permanent *", dict(lps=lps, pcd=pcd, pp=pp, controls=wanted)))
+        permanent = dict(lps=lps, pcd=pcd, pp=pp, controls=wanted)
+        self.init_status = self.lib.fw_init(self.ffi.new("fw_permanent *", permanent))
         self.watch = NoWatch()
 
     # ---- the line
@@ -225,7 +226,8 @@ class Master:
         if not self.port.line or self.apf:
             return ABORTED, 0
         number, broadcast = call >> 5 & 31, call == 0x7F5
-        answers = [a for s in self.slaves if (broadcast or s.index & 31 == number) and (a := s.answer(call)) is not None]
+        answers = [a for s in self.slaves
+                   if (broadcast or s.index & 31 == number) and (a := s.answer(call)) is not None]
         if not answers:
             result = NO_RESPONSE, 0
         elif len(set(answers)) > 1 or self.noise and self.random.random() < self.noise:
@@ -423,8 +425,8 @@ class Master:
         return self
 
     def rounds(self, n=1):
-        """n inclusion rounds: at most 63 candidates, 5 more calls with 2 repetitions each for those that answer; a status
-        poll takes one slot in three."""
+        """n inclusion rounds: at most 63 candidates, 5 more calls with 2 repetitions each for those that answer; a
+        status poll takes one slot in three."""
         return self.cycles(n * (63 + 15 * len(self.slaves)) * 3 // 2)
 
     def probes(self, n):

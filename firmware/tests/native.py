@@ -16,7 +16,8 @@ import cffi
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build/firmware/native"
 # without the storage: it needs a flash (native_store.py)
-SOURCES = [*sorted(p for p in (ROOT / "firmware/core").glob("*.c") if p.name != "asi_store.c"), ROOT / "firmware/tests/native.c"]
+SOURCES = [*sorted(p for p in (ROOT / "firmware/core").glob("*.c") if p.name != "asi_store.c"),
+           ROOT / "firmware/tests/native.c"]
 INCLUDES = [f"-I{ROOT / d}" for d in ("firmware/core", "firmware/generated")]
 PINNED = [sys.executable, "-m", "ziglang", "cc"]
 COMPILER = os.environ["CC"].split() if "CC" in os.environ else ["cc"] if shutil.which("cc") else PINNED

@@ -465,7 +465,8 @@ class Compare:
                      offline_us=r.offline_us)
         for name, value in shown.items():
             assert s[name] == value, (kind, name, s[name], value)
-        assert s["in"] == r.inputs, (kind, [(i, s["in"][i], r.inputs[i]) for i in range(64) if s["in"][i] != r.inputs[i]])
+        wrong = [(i, s["in"][i], r.inputs[i]) for i in range(64) if s["in"][i] != r.inputs[i]]
+        assert s["in"] == r.inputs, (kind, wrong)
         assert p.violations == 0, kind
         self.calls(kind)
         self.events()

@@ -39,8 +39,10 @@ class World:
 
     def slave(self, index):
         extended = index > 32 or self.dice.random() < 0.4
-        return PeripheralSlave(index, io=self.dice.choice(IO), id=EXTENDED_ID if extended else self.dice.choice(STANDARD_ID),
-                               id1=self.dice.randrange(16), id2=self.dice.randrange(16), inputs=self.dice.randrange(1, 16),
+        return PeripheralSlave(index, io=self.dice.choice(IO),
+                               id=EXTENDED_ID if extended else self.dice.choice(STANDARD_ID),
+                               id1=self.dice.randrange(16), id2=self.dice.randrange(16),
+                               inputs=self.dice.randrange(1, 16),
                                old=not extended and self.dice.random() < 0.2,
                                zero_sel=extended and self.dice.random() < 0.5)
 
@@ -90,7 +92,8 @@ class World:
     # ---- the host
     def control(self):
         name = self.dice.choice(("protected_mode", "offline", "data_exchange", "auto_address", "auto_clear"))
-        value = self.dice.randrange(5) if name == "auto_clear" else self.dice.random() < (0.2 if name == "offline" else 0.5)
+        chance = 0.2 if name == "offline" else 0.5
+        value = self.dice.randrange(5) if name == "auto_clear" else self.dice.random() < chance
         if name == "auto_address" and value and any(s.index == 0 for s in self.m.slaves):
             return
         self.m.control(**{name: value})
@@ -118,8 +121,9 @@ class World:
     def timing(self):
         self.m.delay = self.dice.randrange(4)
 
-    ACTIONS = ("appears", "vanishes", "changes_codes", "resets", "comes_and_goes", "comes_and_goes", "misbehaves", "stutters",
-               "fault", "noise", "power", "control", "control", "project", "function", "outputs", "late", "timing")
+    ACTIONS = ("appears", "vanishes", "changes_codes", "resets", "comes_and_goes", "comes_and_goes", "misbehaves",
+               "stutters", "fault", "noise", "power", "control", "control", "project", "function", "outputs", "late",
+               "timing")
 
     def run(self, cycles):
         """At least so many cycles of normal operation."""
@@ -141,7 +145,7 @@ EPISODE = 2_000  # cycles with one plant and host
 
 
 def soak(seed, cycles):
-    """-> cycles run. A seed and a number name an episode: soak(seed, n) starts with the episodes of soak(seed, n - 1)."""
+    """-> cycles run. Seed and number name an episode: soak(seed, n) starts with the episodes of soak(seed, n - 1)."""
     done = episode = 0
     while done < cycles:
         name = seed * 1_000_000 + episode

@@ -46,7 +46,8 @@ def test_index_of_a_call():
         for extended in (False, True):
             decoded = decode_call(payload, lambda number: extended)
             if decoded.name not in ("BR01", "?") and lib.fw_call_is_legal(payload):
-                assert lib.fw_call_index(payload, extended) == decoded.index & (63 if payload & 0x3E0 else 31), hex(payload)
+                index = decoded.index & (63 if payload & 0x3E0 else 31)
+                assert lib.fw_call_index(payload, extended) == index, hex(payload)
 
 
 def test_worked_words():

@@ -2,7 +2,7 @@
 """Combined transaction type 2: bits, messages, cyclic service; a line that loses, repeats or is late with any call."""
 import pytest
 from asi import ctt_table as table
-from ctt_doubles import ANSWER_LOST, LATE, OK, REPEATED, REQUEST_LOST, Ctt2, Line
+from ctt_line import ANSWER_LOST, LATE, OK, REPEATED, REQUEST_LOST, Ctt2, Line, choose
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from native_ctt import load
@@ -69,9 +69,8 @@ def test_identification():
 def test_cyclic_values(config, words_in, bytes_out):
     """CT-021, CT-002: lengths from the I/O configuration byte; a single byte is the low half of its word."""
     data = bytes(range(0xA1, 0xA9))
-    slave = Ctt2(config & 0x77 if config != 0x77 else 0)
-    slave.answers[b"\x10\x00\x05"] = bytes([0x50, 1, 2, 3, 4, config])
-    slave.inputs = lambda: data[:slave.n_in]
+    slave = Ctt2(config)
+    slave.inputs_now = lambda: data[:slave.n_in]
     line = Line(setup(), 7, S755, slave)
     line.set_ao(0x1234, 0x5678, 0x9ABC, 0xDEF0)
     line.run(ID_CALLS)
@@ -114,12 +113,12 @@ def test_parallel_bits(codes, index, in_mask, out_mask, rest):
     line = Line(setup(), index, codes, slave)
     for n in range(300):
         line.outputs = n * 7 & 15
-        slave.digital = n * 5 & 3
+        slave.inputs = n * 5 & 3
         line.call()
         sent, answer = line.log[-1]
         wanted = ((line.outputs ^ 15) & out_mask) | rest
         line.run(1)
-        assert slave.outputs & (out_mask | rest) == wanted & (out_mask | rest)
+        assert slave.sent & (out_mask | rest) == wanted & (out_mask | rest)
         assert line.lib.fc_inputs(index, answer) == n * 5 & in_mask
     assert line.status & TV
 
@@ -148,7 +147,7 @@ def test_long_message():
     slave = Ctt2(0x22, answers={request_: response})
     line = Line(setup(), 7, S755, slave).run(ID_CALLS + 100)
     assert message(line, request_) == 0
-    line.until(lambda: slave.requests[-1] != request_ and len(slave.levels) == 0, 100)
+    line.until(lambda: slave.requests[-1] != request_ and slave.levels_left() == 0, 100)
     assert line.until(lambda: not line.lib.fc_string_open(), 4000) <= 16 * (3 + 201) + 100
     assert bytes(line.lib.fc_string_bytes()[0:201]) == response
     assert slave.requests.count(b"\x00") + slave.requests.count(b"\x01\0\0") < 6
@@ -179,12 +178,12 @@ def test_response_time_out():
     assert status == TRANSFER
     line.run(16 * 4 + GAP)
     assert line.ai[0] == 0xCAFE and line.status == TV | 1
-    slave.inputs = lambda: None
+    slave.inputs_now = lambda: None
     line.run(16 * 3 + 1990)
     assert line.status == TV | 1
     line.run(60)
     assert line.status == 0 and line.ai[0] == 0
-    slave.inputs = lambda: b"\xBE\xEF"
+    slave.inputs_now = lambda: b"\xBE\xEF"
     line.until(lambda: line.status == TV | 1, 3000)
     assert line.ai[0] == 0xBEEF
 
@@ -194,7 +193,7 @@ def test_broken_message_is_tried_again():
     slave = Ctt2(0x02, inputs=lambda: b"\xCA\xFE")
     line = Line(setup(), 7, S755, slave).run(ID_CALLS + 48)
     for n in range(3):
-        line.until(lambda: len(slave.levels) == 20, 100)
+        line.until(lambda: slave.levels_left() == 20, 100)
         line.call(ANSWER_LOST).run(19 + GAP)
         assert (line.status, line.ai[0]) == ((1, 0xCAFE) if n < 2 else (0, 0))
     line.until(lambda: line.status == TV | 1, 100)
@@ -202,12 +201,12 @@ def test_broken_message_is_tried_again():
 
 
 def test_broken_error_response():
-    """CT-022, CT-003: an error response of unknown length that lost a bit is no whole number of bytes: transfer error."""
+    """CT-022, CT-003: an error response of unknown length that lost a bit is no whole number of bytes: TRANSFER."""
     request_ = b"\x12\x05\x01"
     slave = Ctt2(0, answers={request_: b"\x92\x02\x11"})
     line = Line(setup(), 7, S755, slave).run(ID_CALLS)
     assert message(line, request_) == 0
-    line.until(lambda: len(slave.levels) == 9, 200)
+    line.until(lambda: slave.levels_left() == 9, 200)
     line.call(ANSWER_LOST).until(lambda: not line.lib.fc_string_open(), 100)
     assert line.lib.fc_string_status() == TRANSFER
     assert exchange(line, request_) == (DEVICE, b"\x92\x02\x11")
@@ -278,10 +277,10 @@ def test_swapped_and_back_and_no_message():
 
 @pytest.mark.parametrize("name, value", [("MSB_FIRST", 0), ("RISING_EDGE", 0), ("IDLE", 2), ("IDLE", 0),
                                          ("GAP_CALLS", 12)])
-def test_alternatives(name, value):
+def test_alternatives(monkeypatch, name, value):
     """CT-020: the other choices of the table compile and work, each alone."""
-    slave = Ctt2(0x22, inputs=lambda: b"\xCA\xFE", other={f"CTT2_{name}": value},
-                 answers={b"\x12\x05\x01": b"\x92\x01\x02"})
+    choose(monkeypatch, f"ASI_CTT2_{name}={value}")
+    slave = Ctt2(0x22, inputs=lambda: b"\xCA\xFE", answers={b"\x12\x05\x01": b"\x92\x01\x02"})
     line = Line(setup(f"ASI_CTT2_{name}={value}"), 7, S755, slave)
     line.set_ao(0x8421)
     line.run(ID_CALLS + 16 * 12 + 30)

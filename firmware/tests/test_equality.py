@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same plant on the chip (RTL, soft core, firmware image) and on the protocol core over the fake sequencer: the same
-telegrams, one by one. What happens in the plant happens between the same two telegrams on both sides.
+"""The same plant on the chip (RTL, soft core, firmware image) and on the protocol core over the fake sequencer: the
+same telegrams, one by one. What happens in the plant happens between the same two telegrams on both sides.
 
 Five numbers at least: with fewer the cycle is over before the soft core has taken the last report, and a probe repeats.
 """
@@ -26,9 +26,10 @@ def image():
 
 
 def plant():
-    """Standard slaves, a pair, lone B slaves; inputs only, because the two models differ in what an output pin reads."""
+    """Standard slaves, a pair, lone B slaves; inputs only: the two models differ in what an output pin reads."""
     slaves = [PeripheralSlave(1, io=0, id=1, inputs=5), PeripheralSlave(2, io=0, id=0xF, id1=2, inputs=9),
-            PeripheralSlave(5, io=0, id=0xA, id1=3, id2=2, inputs=3), PeripheralSlave(37, io=0, id=0xA, id1=11, inputs=12),
+            PeripheralSlave(5, io=0, id=0xA, id1=3, id2=2, inputs=3),
+            PeripheralSlave(37, io=0, id=0xA, id1=11, inputs=12),
             PeripheralSlave(9, io=0, id=1, inputs=1), PeripheralSlave(12, io=0, id=9, inputs=6),
             PeripheralSlave(52, io=0, id=0xA, id1=9, inputs=7), PeripheralSlave(21, io=0, id=1, inputs=2),
             PeripheralSlave(22, io=0, id=1, inputs=4), PeripheralSlave(25, io=0, id=1, inputs=8),
@@ -61,7 +62,8 @@ def on_core(slaves, events, telegrams):
 
 def on_chip(slaves, events, telegrams):
     with native.Chip(firmware=image()) as chip:
-        handles = {s.index: chip.net.add(s.index, s.io, s.id, s.id1, s.id2, s.inputs, present=s.present) for s in slaves}
+        handles = {s.index: chip.net.add(s.index, s.io, s.id, s.id1, s.id2, s.inputs, present=s.present)
+                   for s in slaves}
         log, last = [], 0
         events, faults = dict(events), set()
         while len(log) < telegrams:
@@ -82,7 +84,8 @@ def on_chip(slaves, events, telegrams):
 # the chip's slaves are deaf for 10 ms (65 telegrams) after power-up: they return just after they were probed
 SCENARIOS = {
     "start": ({}, 900),
-    "loss and return": ({400: [("vanishes", 9), ("vanishes", 37)], 700: [("returns", 9)], 800: [("returns", 37)]}, 2400),
+    "loss and return": ({400: [("vanishes", 9), ("vanishes", 37)], 700: [("returns", 9)], 800: [("returns", 37)]},
+                        2400),
     "broken cable": ({400: [("vanishes", i) for i in (21, 22, 25, 31, 52, 63)],
                       850: [("returns", i) for i in (21, 22, 25, 31, 52, 63)]}, 2400),
     "peripheral fault": ({400: [("fault", 12), ("fault", 63)], 900: [("fault", 12)]}, 1500),
@@ -91,8 +94,8 @@ SCENARIOS = {
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_same_telegrams(name):
-    """EX-004, EX-008, EX-012 .. EX-015, EX-027, EX-029, LK-001 .. LK-004, LK-008: chip and core send the same calls in the
-    same order and see the same answers."""
+    """EX-004, EX-008, EX-012 .. EX-015, EX-027, EX-029, LK-001 .. LK-004, LK-008: chip and core send the same calls in
+    the same order and see the same answers."""
     events, telegrams = SCENARIOS[name]
     chip, core = on_chip(plant(), events, telegrams), on_core(plant(), events, telegrams)
     first = next((k for k in range(telegrams) if chip[k] != core[k]), None)

@@ -696,14 +696,14 @@ def test_auto_clear(mode, fault):
 
 
 def test_auto_clear_at_start():
-    """EX-033: a projected slave that is missing from the start stops the line in its first cycle of normal operation."""
+    """EX-033: a projected slave that is missing from the start stops the line in its first cycle of operation."""
     m = Master([std(1)], projected=[std(1), std(2)], protected_mode=True, auto_clear=1).start()
     m.cycles(1)
     assert m.read()["phase"] == OFFLINE and m.controls()["offline"]
 
 
 def test_auto_clear_goes_alone():
-    """EX-033, FN-021: auto clear goes with neither automatic addressing nor configuration mode, whichever comes first."""
+    """EX-033, FN-021: auto clear goes with neither automatic addressing nor configuration mode, in either order."""
     m = Master([std(1)], projected=[std(1)])
     assert m.control(auto_clear=1) == AUTO_CLEAR_MODE
     m.protect()
@@ -843,7 +843,7 @@ def test_suspected_duplicates():
     assert [e[1:] for e in m.events()[1] if e[1] == 12] == [(12, 4, 1), (12, 4, 0)] * 2
 
 
-# ------------------------------------------------------------------------------------------ the projection changes meanwhile
+# ------------------------------------------------------------------------------------ the projection changes meanwhile
 @pytest.mark.parametrize("calls", [3, 4])
 def test_projection_change_during_inclusion(calls):
     """EX-009, EX-013: a slave that the host takes out of its project between WPAR and DEXG is not activated."""
@@ -884,7 +884,7 @@ def test_projection_change_between_activation_batches():
 
 # ------------------------------------------------------------------------------------------ with combined transactions
 def test_multiplexed_slave():
-    """CT-030, LK-018: S-7.A.7: its slot is live and carries outputs 3, 2 and 1, 0 in turns; the cycle is not too short."""
+    """CT-030, LK-018: S-7.A.7: its slot is live with outputs 3, 2 and 1, 0 in turn; the cycle is not too short."""
     m = Master([ab(5, io=7, id2=7)])
     m.host_outputs[5] = 0b1001
     m.start().cycles(8)

@@ -62,8 +62,8 @@ def test_permanent_configuration():
 
 
 def test_store_actual_configuration():
-    """FN-010, FN-011: CDI becomes PCD, LAS becomes LPS, PP of slaves not in LPS becomes F: one permanent update; the mode
-    can be changed then and all slaves are active."""
+    """FN-010, FN-011: CDI becomes PCD, LAS becomes LPS, PP of slaves not in LPS becomes F: one permanent update; the
+    mode can be changed then and all slaves are active."""
     slaves = [Slave(1, io=3), Slave(4, id=0xA, id1=2), Slave(36, id=0xA), Slave(9, mute=frozenset({"WPAR"}))]
     m = Master(slaves, projected=[Slave(20)], parameters={4: 5, 20: 6}).start()
     assert m.read()["lds"] == {1, 4, 9, 36} and m.read()["las"] == {1, 4, 36}
@@ -115,7 +115,8 @@ def test_operation_mode():
     m = Master([Slave(1)], projected=[Slave(1)]).start()
     stored = m.read()["permanent_version"]
     m.protect()
-    assert m.read()["phase"] == OFFLINE and m.read()["permanent_version"] == stored + 1 and m.controls()["protected_mode"]
+    assert m.read()["phase"] == OFFLINE and m.read()["permanent_version"] == stored + 1
+    assert m.controls()["protected_mode"]
     m.until(lambda s: s["phase"] == DATA_EXCHANGE)
     m.slaves.append(Slave(0))
     m.until(lambda s: 0 in s["lds"])
@@ -163,7 +164,7 @@ def test_auto_address_control():
 
 
 def test_data_exchange_back_during_an_inclusion():
-    """EX-024, FN-019, EX-013: the slave that is included in the last cycle before the new activation does not stop it."""
+    """EX-024, FN-019, EX-013: a slave that is included in the last cycle before the new activation does not stop it."""
     for moment in range(1, 12):
         m = Master([Slave(1, inputs=5), Slave(9, inputs=6, present=False)]).start()
         m.set_data_exchange(False)

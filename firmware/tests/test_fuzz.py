@@ -18,8 +18,8 @@ def run(*arguments):
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_random_inputs(seed):
-    """EX-025: random slaves, answers, functions and ill-fitting reports: no access out of bounds, no undefined behaviour,
-    consistent lists, refused functions change nothing."""
+    """EX-025: random slaves, answers, functions and ill-fitting reports: no access out of bounds, no undefined
+    behaviour, consistent lists, refused functions change nothing."""
     assert run(seed, 150) > 3_000
 
 

@@ -39,7 +39,7 @@ def test_plants_keep_their_promise(ran):
 
 
 def test_monitor_and_master_count_the_same(ran):
-    """PL-002, HW-004: the counters in the host window follow the line as the passive monitor sees it, up to one cycle."""
+    """PL-002, HW-004: the counters in the host window follow the line as the passive monitor sees it, to one cycle."""
     plant, result, records = ran
     requests, sent = result["telegrams"]["requests"], result["master"]["sent"]
     assert len(records) == requests and sent <= requests <= sent + 2 * 33  # a cycle: 31 calls and an extra, repeated

@@ -35,7 +35,7 @@ def analog_csv(train, rate=8_000_000):
     ("pulses.vcd", lambda: vcd(levels(TRAIN))), ("pulses.csv", lambda: csv_text(levels(TRAIN))),
     ("man.csv", lambda: csv_text(man_levels(TRAIN), "time_ns,man")), ("volts.csv", lambda: analog_csv(TRAIN))])
 def test_all_kinds_of_captures(tmp_path, name, content):
-    """RP-001, ST-006, DE-001: pulses, Manchester level and voltage reach the receiver; it sees what the decoder sees."""
+    """RP-001, ST-006, DE-001: pulses, Manchester level, voltage reach the receiver; it sees what the decoder sees."""
     result = replay.replay(write(tmp_path, content(), name), FIRMWARE)
     assert result.calls == len(TALK) and not result.differences and not result.lost
     requests = [record for _, record in result.records if record.request]
@@ -82,8 +82,8 @@ def test_silence_is_cut(tmp_path):
 
 
 def test_stuck_line(tmp_path):
-    """RP-001, RP-002: a comparator stuck for hours between two conversations costs no simulated time and spoils nothing;
-    times too large to be exact are refused in one line."""
+    """RP-001, RP-002: a comparator stuck for hours between two conversations costs no simulated time and spoils
+    nothing; times too large to be exact are refused in one line."""
     hour = 3_600_000_000_000
     rows = levels(TRAIN) + [(hour, 1, 0), (2 * hour, 0, 0)] + levels(conversation(*TALK, start=2 * hour + 100_000))[1:]
     result = replay.replay(write(tmp_path, csv_text(rows), "stuck.csv"), FIRMWARE)
@@ -145,10 +145,12 @@ def test_command(tmp_path):
     bad = run(app, ["replay", str(write(tmp_path, "nothing", "bad.csv")), *base])
     assert bad.exit_code == 2 and len(bad.stderr.splitlines()) == 1
     missing = run(app, ["replay", str(path), "--firmware", str(tmp_path / "none.hex")])
-    assert missing.exit_code == 3 and missing.stderr == f"simulation: firmware {tmp_path}/none.hex: No such file or directory\n"
+    assert missing.exit_code == 3
+    assert missing.stderr == f"simulation: firmware {tmp_path}/none.hex: No such file or directory\n"
     for option in ("--out", "--waves"):     # told at once, not after the simulation
         nowhere = run(app, ["replay", str(path), option, str(tmp_path / "none/x"), *base])
-        assert nowhere.exit_code == 2 and nowhere.stderr.splitlines() == [f"{tmp_path}/none/x: No such file or directory"]
+        assert nowhere.exit_code == 2
+        assert nowhere.stderr.splitlines() == [f"{tmp_path}/none/x: No such file or directory"]
     good = run(app, ["replay", str(write(tmp_path, csv_text(levels(TRAIN)), "x.csv")), "--out", str(records), *base])
     assert good.exit_code == 0 and len(records.read_text().splitlines()) == 2 * len(TALK) - 1
 

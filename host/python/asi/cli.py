@@ -192,7 +192,8 @@ def run(
             console = Console(highlight=False, width=120)  # a file or a pipe has no width of its own
         console.print(Text(" ".join(described.description.split()), style="dim"))
         if quick and not chosen:
-            console.print("note: the wait after power-up is 20 ms instead of 1 s in this run; --no-quick, QUICK=0 keep it")
+            console.print("note: the wait after power-up is 20 ms instead of 1 s in this run; "
+                          "--no-quick, QUICK=0 keep it")
         if until_ns <= settle_ns:
             console.print(f"note: the line stays quiet until {report.ms(settle_ns)}, the wait after power-up")
         wave_path = out / "waves.part" if waves else None

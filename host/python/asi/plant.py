@@ -955,7 +955,8 @@ class _Builder:
         for text, words in table.received.items():
             found = self.guard_key(f"received.{_show(text)}", lambda t=text: self.find(t))
             if len(found) != 1 or not words or "invalid" in words or len(words) > self.slaves[found[0]].kind.heard:
-                raise _Fault(f"received.{_show(text)}", "not one slave with that many outputs of a combined transaction")
+                raise _Fault(f"received.{_show(text)}",
+                             "not one slave with that many outputs of a combined transaction")
             received[found[0]] = tuple(words)
         return Check(time_ns, table.lds, table.las, table.lps, dict(table.flags), inputs, table.cycle_max, table.lpf,
                      table.suspects, parameters, {i: tuple(w) for i, w in analog.items()}, received,

@@ -178,7 +178,7 @@ class Runner:
         with TelegramLog(self.folder if self._log_wanted else None, self.plant.extended,
                          self._trace and self._trace.add) as log:
             try:
-                self._loop(log)
+                self.play(log)
             except KeyboardInterrupt:
                 interrupted = True
             except (SimulationError, WindowError, FunctionError) as fault:
@@ -214,7 +214,8 @@ class Runner:
         return [self.bench.get_value(self._handles[position], channel) for channel in range(heard)]
 
     # ------------------------------------------------------------ the loop
-    def _loop(self, log: TelegramLog) -> None:
+    def play(self, log: TelegramLog) -> None:
+        """The run itself, without a report; SimulationError, WindowError, FunctionError."""
         for slave in self.plant.slaves:
             self._handles.append(self.bench.add(slave))
         actions = self.plant.iter_actions()
