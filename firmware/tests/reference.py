@@ -351,7 +351,9 @@ class Reference:
     def next_call(self):
         """FN-032: one call per management slot"""
         job = next((j for j in (self.job, self.automatic) if j.status == BUSY), None)
-        if job and not (job.called or self.management is not None or self.again) and (self.now - job.since) % 2**32 >= job.pause:
+        if job is None or job.called or self.management is not None or self.again:
+            return
+        if (self.now - job.since) % 2**32 >= job.pause:
             job.called = True
             self.manage(job.call(), job, job.kind == FN_EXECUTE and (job.index, job.value) == BROADCAST)
 

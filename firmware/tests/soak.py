@@ -38,8 +38,8 @@ class World:
         self.m = Master(slaves, projected, seed=seed, protected_mode=protected,
                         auto_clear=self.dice.choice((0, 0, 0, 1, 2, 3)) if protected else 0)
         self.compare = Compare(self.m)
-        for s in slaves:
-            s.clock = self.clock
+        self.actions = self.dice.choice((self.ACTIONS, self.ACTIONS, self.REPLACEMENTS))
+        self.actions += ("job",) * self.dice.choice((3, 15, 60) if self.actions == self.ACTIONS else (0, 3))
         self.m.settle()
 
     def clock(self):
@@ -54,7 +54,7 @@ class World:
                      id1=id1, id2=self.dice.randrange(16), inputs=self.dice.randrange(1, 16),
                      old=not extended and self.dice.random() < 0.2,
                      zero_select=self.dice.choice(ZERO_SELECTS) if extended else "0", clock=self.clock,
-                     write_us=self.dice.choice((0, 0, 0, 9_000, 60_000, 600_000)),
+                     write_us=self.dice.choice((0,) * 12 + (9_000,) * 6 + (60_000,) * 3 + (600_000,)),
                      memory_fails=self.dice.random() < 0.1, id1_protected=self.dice.random() < 0.1)
 
     def some(self):
@@ -70,8 +70,10 @@ class World:
     def replaces(self):
         """A projected slave breaks down; one like it comes with address 0 (AD-008)."""
         lps, pcd, _, _ = self.m.permanent()
+        lds = self.compare.r.lds
         if lps:
-            i = self.dice.choice(sorted(lps))
+            missing = sorted(lps - lds) or sorted(lps)  # two missing ones would be too many
+            i = self.dice.choice(missing)
             self.m.slaves = [x for x in self.m.slaves if x.index not in (0, i)]
             new = self.slave(0)
             new.io, new.id, new.id1, new.id2 = (pcd[i] >> k & 15 for k in (0, 4, 8, 12))
@@ -134,10 +136,13 @@ class World:
     def job(self):
         """A function with telegrams, at times with arguments that make no sense."""
         here = sorted(self.compare.r.lds) or [0]
+        if here[0] == 0 and self.dice.random() < 0.7:
+            here = [0]  # it is in the way of the others
         index = self.dice.choice((*here, *here, *here, self.dice.choice(self.indices), 0, 32, 64))
         kind, index, value = self.dice.choice((
-            (FN_PARAMETER, index, self.dice.randrange(17)), (FN_CHANGE, index, self.dice.choice((*self.indices, index, 64))),
-            (FN_CHANGE, index, self.dice.choice(self.indices)), (FN_CHANGE, index, index ^ 32), (FN_CHANGE, index, 0),
+            (FN_PARAMETER, index, self.dice.randrange(17)), (FN_CHANGE, index, self.dice.choice((index, 64))),
+            (FN_CHANGE, index, self.dice.choice(self.indices)), (FN_CHANGE, index, self.dice.choice(self.indices)),
+            (FN_CHANGE, index, index ^ 32), (FN_CHANGE, index, 0),
             (FN_EXECUTE, index & 31, self.dice.randrange(32)), (FN_EXECUTE, index & 31, 0x1C), (FN_EXECUTE, 31, 0x15),
             (FN_WRITE_ID1, 0, self.dice.randrange(17)), (self.dice.randrange(27), index, self.dice.randrange(64))))
         self.compare.start(kind, index, value)
@@ -157,16 +162,18 @@ class World:
     def timing(self):
         self.m.delay = self.dice.randrange(4)
 
-    ACTIONS = ("appears", "vanishes", "changes_codes", "resets", "comes_and_goes", "comes_and_goes", "misbehaves", "stutters",
-               "fault", "noise", "power", "control", "control", "project", "function", "outputs", "late", "timing", "job", "job", "job", "job",
+    ACTIONS = ("appears", "vanishes", "changes_codes", "resets", "comes_and_goes", "comes_and_goes", "misbehaves",
+               "stutters", "fault", "noise", "power", "control", "control", "project", "function", "outputs", "late", "timing",
                "automatic", "replaces")
+    REPLACEMENTS = ("automatic", "automatic", "replaces", "replaces", "replaces", "misbehaves", "stutters", "noise", "power",
+                    "resets", "comes_and_goes", "control", "late", "timing")
 
     def run(self, cycles):
         """At least so many cycles of normal operation."""
         end = self.m.cycle_number + cycles
         while self.m.cycle_number < end:
             for _ in range(self.dice.choice((1, 1, 1, 2, 4))):
-                getattr(self, self.dice.choice(self.ACTIONS))()
+                getattr(self, self.dice.choice(self.actions))()
             for _ in range(self.dice.choice((1, 3, 20, 100))):
                 self.m.step()
             if self.m.apf and self.dice.random() < 0.5:
@@ -181,20 +188,21 @@ class World:
         del self.m.log[:]
 
     def home(self):
-        """EX-012, EX-013, AD-004: left alone with slaves that answer, the master finds every one, wherever it is by now."""
+        """EX-012, EX-013, AD-004: left alone the master finds every slave that answers, wherever it is by now."""
         m = self.m
         m.noise = 0.0
         for s in m.slaves:
-            s.mute, s.present, s.deaf = frozenset(), True, 0
+            s.mute, s.present, s.deaf, s.write_us, s.writing_until = frozenset(), True, 0, 0, None
         m.power(False)
         assert m.control(offline=False, auto_clear=0, auto_address=False) == 0
-        for _ in range(1000):  # what is open ends
+        for _ in range(40_000):  # what is open ends, its waits for memories and tries included
             m.step()
             if not self.compare.r.busy() and not self.compare.r.again:
                 break
         assert not self.compare.r.busy()
         standard = {s.index for s in m.slaves if not s.extended}
-        seen = {s.index: s for s in m.slaves if s.index - 32 not in standard}  # one for each address, no B beside a standard
+        # one for each address, no B beside a standard slave
+        seen = {s.index: s for s in m.slaves if s.index - 32 not in standard}
         m.slaves = list(seen.values())
         if m.slaves:
             m.until(lambda s: s["phase"] == 3)
