@@ -34,14 +34,10 @@ $(FW)/boot.hex: $(FW)/boot.elf tools/elf2hex.py
 	@$(VPY) tools/elf2hex.py $< --hex $@ --limit 1024
 
 .PHONY: firmware-coverage
-firmware-coverage: $(VENV)/.ready  ## native firmware tests with line and branch coverage of firmware/core (needs gcov)
+firmware-coverage: $(VENV)/.ready  ## native firmware tests with line and branch coverage of firmware/core (needs gcov); UNTAKEN=1 lists the rest
 	@rm -rf $(FW)/native
 	@FW_COVERAGE=1 $(VPY) -m pytest firmware/tests -k 'not image'
-	@cd $(FW)/native && gcov -b -n libasi_branches*.gcda | grep -A3 "File.*firmware/core"
-	@echo "the engines of the combined transactions, in the library of their own tests (type 4 is off in the first):"
-	@cd $(FW)/native && for f in libasi_ctt_branches.*-asi_ctt*.gcda \
-	    libasi_ctt_branches-ctt4_enable_1.*-asi_ctt4.gcda; do \
-	  gcov -b -n $$f | grep -A3 "File.*firmware/core/asi_ctt[0-9]*\.c"; done
+	@$(VPY) tools/coverage_table.py $(FW)/native --below 95 $(if $(filter 1,$(UNTAKEN)),--untaken)
 
 CYCLES ?= 1000000
 SEEDS  ?= 1 2 3 4

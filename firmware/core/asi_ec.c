@@ -103,9 +103,11 @@ void ec_stop(asi_ec_t *ec, asi_offline_cause_t cause)
 
 void ec_reactivate(asi_ec_t *ec, uint32_t pause_us)
 {
+    if (!ec->reactivate || pause_us != 0u) { /* a pause that runs is not cut short (FN-022) */
+        ec->reactivate_from_us = asi_port_time_us();
+        ec->reactivate_pause_us = pause_us;
+    }
     ec->reactivate = true;
-    ec->reactivate_from_us = asi_port_time_us();
-    ec->reactivate_pause_us = pause_us;
     asi_port_cycle(0);
 }
 

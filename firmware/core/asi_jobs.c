@@ -534,9 +534,9 @@ void ec_job_abort(asi_ec_t *ec)
 {
     asi_job_t *job = open_job(ec);
     ec->held = ASI_LIST_EMPTY; /* inclusion has ended before */
-    ec->auto_failed = false;
     if (job)
         finish(ec, job, ASI_E_ABORTED);
+    ec->auto_failed = false; /* slave 0 is not to blame: no wait (AD-009) */
 }
 
 /* ------------------------------------------------------------------------------------------ beginning */

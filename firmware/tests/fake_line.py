@@ -168,17 +168,7 @@ def words_of(nibbles):
     return [sum(nibbles[8 * w + k] << 4 * k for k in range(8)) for w in range(8)]
 
 
-@dataclass
-class PeripheralSlave(Slave):
-    """A slave that reports a peripheral fault: S1 of its status. At address 0 it may obey Sel = 1 (AD-007)."""
-    fault: bool = False
-    zero_sel: bool = False
-
-    def answer(self, call):
-        if self.index == 0 and self.zero_sel and call >> 10:
-            call ^= 8
-        data = super().answer(call)
-        return data if data is None or name_of(call)[0] != "RDST" else data & ~2 | 2 * self.fault
+PeripheralSlave = Slave  # one that reports faults: they all do
 
 
 class NoWatch:

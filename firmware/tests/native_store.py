@@ -23,10 +23,11 @@ def library(name, sources, flags):
     counting = os.environ.get("FW_COVERAGE") == "1" or os.environ.get("ASI_COVERAGE") == "1" and GCOV
     if counting:
         flags, name = [*flags, "--coverage", "-DFW_GCOV"], f"{name}_lines"
-    if os.environ.get("FW_COVERAGE") != "1":
+    level = "-O0" if os.environ.get("FW_COVERAGE") == "1" else "-O1"
+    if level == "-O1":
         flags = [*flags, *SANITIZE]
     return compile_native(BUILD / f"lib{name}.so", [*sources, *model()],
-                          ["-fPIC", "-shared", "-O1", *(f"-I{ROOT}/firmware/{d}" for d in ("hal", "app")), *flags])
+                          ["-fPIC", "-shared", level, *(f"-I{ROOT}/firmware/{d}" for d in ("hal", "app")), *flags])
 
 
 def model():

@@ -3,6 +3,7 @@
 
 A cycle of this fake has one extra slot, and 5 ms; all times are bus time, counted here.
 """
+import os
 from collections import Counter
 
 import cffi
@@ -840,8 +841,12 @@ def fake_strings():
     ffi.cdef(text.split("/* cffi begin */")[1].split("/* cffi end */")[0])
     ffi.cdef("extern int fake_refuse; extern unsigned fake_kind;"
              "void fake_end(int status, unsigned length); int fake_open(void);")
-    flags = ["-fPIC", "-shared", "-O1", *SANITIZE]
-    return ffi, ffi.dlopen(str(compile_native(BUILD / "libasi_strings.so", sources, flags)))
+    counting = os.environ.get("FW_COVERAGE") == "1"
+    name, flags = ("libasi_strings_branches.so", ["-O0", "--coverage", "-DFW_GCOV"]) if counting else (
+        "libasi_strings.so", ["-O1", *SANITIZE])
+    library = ffi.dlopen(str(compile_native(BUILD / name, sources, ["-fPIC", "-shared", *flags])))
+    yield ffi, library
+    library.fw_counters_write()
 
 
 def strings_line(library, **kw):
