@@ -321,9 +321,13 @@ unsigned asi_ctt2_call(asi_ctt_t *c, unsigned index, const asi_ctt_call_t *call)
                 choose(c, index);
         }
     }
-    if (!s->known && ctt_elapsed(call->now_us, s->try_us, ASI_CTT2_TRY_MS)) {
+    if (s->known && s->step != GAP)
+        s->try_us = call->now_us; /* known: when the gap began */
+    if (ctt_elapsed(call->now_us, s->try_us, s->known ? ASI_CTT2_RESPONSE_MS : ASI_CTT2_TRY_MS)) {
         s->try_us = call->now_us;
-        if (asi_list_has(&c->swapped, index))
+        if (s->known)
+            s->service = GET; /* its clock never rests: no gap comes, so nothing can be asked */
+        else if (asi_list_has(&c->swapped, index))
             asi_list_remove(&c->swapped, index);
         else
             asi_list_add(&c->swapped, index);

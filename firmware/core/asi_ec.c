@@ -456,7 +456,8 @@ void asi_ec_quality(asi_ec_t *ec, unsigned index, uint32_t good, uint32_t silent
 {
     uint32_t points = ec->suspicion[index];
     const bool was = asi_list_has(&ec->state.suspects, index);
-    if (garbled > 4u * silent) /* two slaves disturb each other; a dead or far one is silent */
+    /* two slaves disturb each other; a dead or far one is silent, one on a noisy line mostly gets through */
+    if (garbled > 4u * silent && 4u * garbled > good)
         points += garbled;
     else if (silent != 0u)
         points = points > 2u * silent ? points - 2u * silent : 0u;

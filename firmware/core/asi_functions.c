@@ -120,6 +120,14 @@ static asi_status_t check_modes(bool protected_mode, bool auto_address, unsigned
     return auto_clear && (auto_address || !protected_mode) ? ASI_E_AUTO_CLEAR_MODE : ASI_OK;
 }
 
+/** No data, no values: substitutes instead of the last ones, and an open string or message ends (CT-005). When data exchange
+ * comes back all of LAS is activated anew, and the engines with it. */
+static void stop_transactions(asi_ec_t *ec)
+{
+    for (unsigned i = asi_list_next(&ec->state.las, 0u); i < ASI_INDICES; i = asi_list_next(&ec->state.las, i + 1u))
+        asi_ctt_close(&ec->ctt, i);
+}
+
 asi_status_t asi_fn_set_controls(asi_ec_t *ec, const asi_controls_t *c)
 {
     asi_permanent_t *p = &ec->permanent;
@@ -145,10 +153,12 @@ asi_status_t asi_fn_set_controls(asi_ec_t *ec, const asi_controls_t *c)
         ec_stop(ec, ASI_OFFLINE_HOST);
     ec->offline = c->offline;
     if (ec->state.phase == ASI_PHASE_DATA_EXCHANGE) { /* EX-024 */
-        if (starts)
+        if (starts) {
             ec_reactivate(ec, 0u);
-        else if (stops)
+        } else if (stops) {
+            stop_transactions(ec);
             ec_run_cycle(ec);
+        }
     }
     if (changed) {
         ec->state.permanent_version++;

@@ -72,8 +72,11 @@ static void finish(asi_ec_t *ec, asi_job_t *job, asi_status_t status)
     const asi_list_t nobody = ASI_LIST_EMPTY;
     job->status = status;
     job->waiting = false;
-    if (is_string(job->kind))
+    if (is_string(job->kind)) { /* bytes for the host: also what a slave said to a refused message */
+        const bool answered = status == ASI_OK || status == ASI_E_DEVICE;
+        job->length = answered && job->kind != ASI_JOB_WRITE_PARAMETER_STRING ? ec->ctt.string.length : 0u;
         asi_ctt_release(&ec->ctt, job->index, asi_port_time_us());
+    }
     if (!asi_list_is_empty(&ec->held))
         ec_inclusion_hold(ec, &nobody);
     if (job->kind == ASI_JOB_AUTO_ADDRESS) {
@@ -403,7 +406,7 @@ static void string_begin_done(asi_ec_t *ec, asi_job_t *job, bool good, unsigned 
     asi_status_t status = ASI_E_NO_ANSWER;
     if (good) {
         ec_set_echo(ec, job->index, (uint8_t)data);
-        status = string_open(ec, job);
+        status = ec->permanent.data_exchange ? string_open(ec, job) : ASI_E_ABORTED; /* it may have stopped meanwhile */
     }
     if (status == ASI_OK)
         go(job, STEP_STRING);
@@ -415,10 +418,8 @@ static void string_begin_done(asi_ec_t *ec, asi_job_t *job, bool good, unsigned 
 static void string_watch(asi_ec_t *ec, asi_job_t *job)
 {
     const asi_string_t *string = &ec->ctt.string;
-    if (string->open)
-        return;
-    job->length = string->status == ASI_OK && job->kind != ASI_JOB_WRITE_PARAMETER_STRING ? string->length : 0u;
-    string_end(ec, job, string->status);
+    if (!string->open)
+        string_end(ec, job, string->status);
 }
 
 static void string_end_done(asi_ec_t *ec, asi_job_t *job, bool good, unsigned data)
@@ -657,6 +658,8 @@ static asi_status_t check_slave(const asi_ec_t *ec, asi_job_kind_t kind, unsigne
     }
     if (!asi_list_has(&ec->state.las, index))
         return ASI_E_NOT_ACTIVE;
+    if (is_string((unsigned)kind) && !ec->permanent.data_exchange)
+        return ASI_E_STATE; /* the bytes move with the data */
     if (kind == ASI_JOB_WRITE_PARAMETER)
         return ec_has_strings(ec, index) ? ASI_E_PROFILE : ASI_OK;
     if (kind == ASI_JOB_MESSAGE)

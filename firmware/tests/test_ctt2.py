@@ -188,6 +188,35 @@ def test_response_time_out():
     assert line.ai[0] == 0xBEEF
 
 
+def test_clock_that_never_rests():
+    """CT-022, FN-031, CT-005: a slave that moves its clock for ever leaves no gap to ask in: the values are invalid and an open
+    message ends after the response time-out, at the latest; when the clock rests everything goes on."""
+    class Restless(Ctt2):
+        mad = False
+        toggle = 0
+
+        def call(self, nibble):
+            answer = super().call(nibble)
+            if self.mad:
+                self.toggle ^= 1 << table.CTT2_DI_CLOCK
+                answer = answer & 3 | self.toggle
+            return answer
+    slave = Restless(0x11, inputs=lambda: b"\x5A")
+    line = Line(setup(), 7, S755, slave).run(ID_CALLS + 100)
+    assert line.status & 1 and line.ai[0] == 0x5A
+    slave.mad = True
+    ten_seconds = table.CTT2_RESPONSE_MS // 5 + 400
+    for _ in range(2):                                  # the second one begins in the gap that never comes
+        assert message(line, b"\x10\x01\x02") == 0
+        line.until(lambda: not line.lib.fc_string_open(), ten_seconds)
+        assert line.lib.fc_string_status() == TRANSFER and not line.status & STRING
+    assert not line.status & (1 | TV) and line.ai[0] == 0
+    slave.mad = False
+    slave.answers[b"\x10\x01\x02"] = b"\x50\x12\x34"
+    line.run(40)
+    assert exchange(line, b"\x10\x01\x02") == (0, b"\x50\x12\x34") and line.until(lambda: line.status & 1, 400) >= 0
+
+
 def test_broken_message_is_tried_again():
     """CT-020, CT-003: a lost answer makes the slave's message short: a gap, then again; twice the values stay."""
     slave = Ctt2(0x02, inputs=lambda: b"\xCA\xFE")

@@ -16,8 +16,8 @@ from asi.telegram import decode_call, encode_call
 WRITE_PARAMETER, CHANGE, EXECUTE, WRITE_ID1, READ_STRING, WRITE_STRING, DIAGNOSIS, READ_ID, MESSAGE, AUTO = (
     5, 20, 22, 24, 27, 28, 29, 30, 31, 32)
 (ARG, STATE, BUSY, ABORT, SLAVE0, NOT_DETECTED, NOT_ACTIVE, USED, NO_ANSWER, DELETE, NO_ID1, BAD_ID1, ID1_TEMPORARY,
- SET_ADDRESS, ADDRESS_TEMPORARY, PROFILE, TOO_LONG, AUTO_CLEAR_MODE, POWER, IS_OFFLINE, TRANSFER) = (
-    -1, -2, -3, -4, -6, -7, -8, -9, -10, -11, -12, -13, -14, -15, -16, -17, -18, -20, -21, -22, -23)
+ SET_ADDRESS, ADDRESS_TEMPORARY, PROFILE, TOO_LONG, AUTO_CLEAR_MODE, POWER, IS_OFFLINE, TRANSFER, DEVICE) = (
+    -1, -2, -3, -4, -6, -7, -8, -9, -10, -11, -12, -13, -14, -15, -16, -17, -18, -20, -21, -22, -23, -24)
 ADDRESSED = 10
 CYCLE_US, NVM_US, POLL_US, RESET_US = 5000, 500_000, 5000, 2000
 EVER = 10**6
@@ -889,6 +889,14 @@ def test_message(fake_strings):
     m.lib.fake_end(0, 3)
     m.cycles(2)
     assert m.job().status == 0 and m.job().length == 3 and not m.calls
+    assert m.begin(MESSAGE, 7, 0, b"\x10\x01") == 0
+    m.lib.fake_end(DEVICE, 2)  # the slave's error response is for the host
+    m.cycles(2)
+    assert m.job().status == DEVICE and m.job().length == 2
+    assert m.begin(MESSAGE, 7, 0, b"\x10\x01") == 0
+    m.lib.fake_end(TRANSFER, 2)
+    m.cycles(2)
+    assert m.job().status == TRANSFER and m.job().length == 0
 
 
 def test_refusals_of_strings(fake_strings):
@@ -953,3 +961,20 @@ def test_string_of_a_lost_slave(fake_strings):
     m.until(lambda: m.lib.fake_open(), 20)
     m.controls(offline=1)
     assert m.job().status == ABORT and not m.lib.fake_open() and m.read()["phase"] == OFFLINE
+
+
+@pytest.mark.parametrize("function, index", [(READ_ID, 3), (WRITE_STRING, 3), (MESSAGE, 7)])
+@pytest.mark.parametrize("when", [0, 1, 2, 5])
+def test_string_and_data_exchange(fake_strings, function, index, when):
+    """FN-019, FN-027, FN-028, FN-031, FN-032: the bytes move with the data: without it strings are refused, and one that is
+    under way ends as ABORTED in a few cycles, so that it does not stand in the way of other functions."""
+    m = strings_line(fake_strings)
+    assert m.begin(function, index, 0, b"abc") == 0
+    m.cycles(when)
+    m.controls(data_exchange=0)
+    m.until(lambda: m.job().status != BUSY, 10)
+    assert m.job().status == ABORT and m.job().length == 0 and not m.lib.fake_open() and m.slaves[0].parameter == 15
+    assert m.begin(function, index, 0, b"abc") == STATE and m.do(EXECUTE, 4, 16) == 0
+    m.controls(data_exchange=1)
+    m.agree()
+    assert m.begin(function, index, 0, b"abc") == 0

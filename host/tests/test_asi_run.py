@@ -263,6 +263,30 @@ def test_failures_of_the_chip_are_named(tmp_path, bench, text):
     assert json.loads((tmp_path / "report.json").read_text()) == result
 
 
+def test_what_the_simulation_refuses_is_a_failed_run(tmp_path):
+    """PL-002: a slave that the simulation does not take, and that no check of the plant knew: a report, no traceback."""
+    bench = FakeBench()
+
+    def add(slave):
+        raise RuntimeError("string 0 of slave 0: refused")
+    bench.add = add
+    result = Runner(load_plant(COMBINED).with_settle(SETTLE), bench, tmp_path).run()
+    assert (result["result"], result["error"]) == ("failed", "string 0 of slave 0: refused")
+
+
+@pytest.mark.parametrize("storage, text", [
+    (("NO_FLASH", False, True, False, 0), "no flash: nothing is kept over power-off"),
+    (("EMPTY", False, False, False, 0), "flash was empty at the start; nothing stored since"),
+    (("EMPTY", True, False, False, 0), "flash was empty at the start; storing"),
+    (("LOADED", False, False, True, 7), "loaded from flash at the start; the data in use is stored, set 7"),
+    (("LOADED", False, True, False, 7), "loaded from flash at the start; storing FAILED: the data in use is not in flash"),
+    (("CORRUPT", False, False, True, 1),
+     "flash was CORRUPT at the start, defaults in use; the data in use is stored, set 1")])
+def test_storage_in_words(storage, text):
+    """PL-002, NV-005: a board without flash is a plain state; a store that failed is loud."""
+    assert report.storage_line(dict(zip(("state", "busy", "failed", "saved", "sequence"), storage))) == text
+
+
 # ---------------------------------------------------------------- combined transactions, functions, log
 @pytest.mark.parametrize("path", [COMBINED, REPLACEMENT], ids=lambda path: path.stem)
 def test_plants_of_the_new_functions(tmp_path, path):
@@ -290,7 +314,8 @@ def test_report_shows_values_functions_and_log(tmp_path):
     for line in (r"2  Temperatures, two channels\s+CTT1\s+in\s+2\s+7FFF 32767  invalid",
                  r"3  Positioner, two set-points\s+CTT1\s+out  2\s+FF9C -100\s+FF9C -100",
                  r"read_id_string 4 at 120.000 ms: OK after", r"write_parameter 4 0111 at 170.000 ms: PROFILE",
-                 r"9 F-IN1=1 F-IN2=0", r"storage\s+NO_FLASH, set 0", r"activated 5B", r"\.\.\. 2 before these"):
+                 r"9 F-IN1=1 F-IN2=0", r"storage\s+no flash: nothing is kept over power-off", r"activated 5B",
+                 r"\.\.\. 2 before these"):
         assert re.search(line, text), line
 
 

@@ -167,12 +167,14 @@ def test_nibbles():
 WRONG = [
     ('name = "Test"', "", "name: missing"),
     ('name = "Test"', "name = 5", "name: 5 is not a text in quotes"),
+    ('name = "Test"', 'name = ""', "name: '' is not a name: 1 to 60 characters, no control characters"),
+    ('name = "Test"', 'name = "Te\\u0007st"', "name: 'Te\\\\x07st' is not a name"),
     ("seed = 5", "sed = 5", "sed: unknown key"),
     ("seed = 5", "seed = true", "seed: "),
     ("seed = 5", "seed = -1", "seed: "),
     ('"2s"', '"2 seconds"', "duration: '2 seconds' is not a time"),
     ('"2s"', '"0s"', "duration: '0s' is too short"),
-    ('mode = "protected"', 'mode = "safe"', "host.mode: 'safe': Input should be 'configuration' or 'protected'"),
+    ('mode = "protected"', 'mode = "safe"', "host.mode: 'safe': must be 'configuration' or 'protected'"),
     ('not_projected = ["7"]', 'not_projected = ["8"]', "host.not_projected: no slave of this plant has address 8"),
     ('not_projected = ["7"]', 'projected = ["8"]', "host.projected: no slave of this plant has address 8 (use"),
     ('not_projected = ["7"]', 'projected = ["9-2"]', "host.projected: '9-2' is not a range"),
@@ -202,7 +204,7 @@ WRONG = [
     ('address = "5B"\nprofile = "S-0.A"', 'address = "5"\nprofile = "S-0.0"', "slave #2.address: 'Left' has it too"),
     ('"5A"\nprofile = "S-7.A.E"', '"5"\nprofile = "S-0.0"', "slave #2.address: 'Left' has the same number"),
     ("present = false", 'present = "no"', "slave #3 (Late).present: 'no' is not true or false"),
-    ('do = "connect"', 'do = "explode"', "event #1.do: 'explode': Input should be 'drop'"),
+    ('do = "connect"', 'do = "explode"', "event #1.do: 'explode': must be 'drop'"),
     ('slave = "7"', "", "event #1.slave: missing: a name, an address or 'all'"),
     ('slave = "7"', 'slave = "8"', "event #1.slave: no slave has address 8"),
     ('slave = "7"', 'slave = "Right"', "event #1.slave: no slave is called 'Right'"),
@@ -406,7 +408,7 @@ RICH_WRONG = [
      "event #2.slave: 'Mux' is replaced twice"),
     ('value = []', 'value = [0]', "event #2.value: [0] is not a list of numbers 1 to 2"),
     ('slave = "Door"', 'slave = "Old"', "event #2.slave: not a safety slave"),
-    ('auto_clear = 3', 'auto_clear = 4', "host.auto_clear: 4: Input should be less than or equal to 3"),
+    ('auto_clear = 3', 'auto_clear = 4', "host.auto_clear: 4: must be less than or equal to 3"),
     ('auto_clear = 3', 'auto_clear = 3\nauto_address = true', "host.auto_clear: goes with neither automatic ad"),
     ('address = "3"\nvalues = [1', 'address = "2"\nvalues = [1', "host.analog #1.address: the slave at 2 has no 16"),
     ('address = "3"\nvalues = [1', 'address = "30"\nvalues = [1', "host.analog #1.address: no slave of this plant has"),
@@ -416,7 +418,7 @@ RICH_WRONG = [
     ('"ADDRESS_USED"', '"USED"', "host.function #1.result: 'USED' is not 'OK' or an error: ARG, STATE"),
     ('new = "7A"\n', 'new = "7A"\ndata = "1"\n', "host.function #1.data: 'change_address' answers with no nibble"),
     ('new = "7A"\n', 'new = "7A"\nanswer = "01"\n', "host.function #1.answer: 'change_address' answers with no str"),
-    ('"read_id_string"', '"read_id"', "host.function #2.do: 'read_id': Input should be 'set_permanent_parameter'"),
+    ('"read_id_string"', '"read_id"', "host.function #2.do: 'read_id': must be 'set_permanent_parameter'"),
     ('do = "read_id_string"\naddress = "4"\nanswer = "00 b7 03"', 'do = "execute"\naddress = "4"\nvalue = "1"',
      "host.function #2.value: '1' is not five binary digits I4..I0"),
     ('do = "read_id_string"\naddress = "4"\nanswer = "00 b7 03"', 'do = "write_id1"\nvalue = "2222"',
@@ -427,11 +429,19 @@ RICH_WRONG = [
     ('suspects = ["2"]', 'suspects = "2"', "expect.suspects: '2' is not a list of addresses"),
     ('"2" = "0101"', '"x" = "0101"', "expect.parameters.'x': 'X' is not an AS-i address"),
     ('[-2, "invalid"]', '[-2, "bad"]', "expect.analog.2 #2: 'bad' is not a 16-bit value, 'invalid' or 'any'"),
-    ('[-2, "invalid"]', '[1, 2, 3, 4, 5]', "expect.analog.'2': index 2 has no channel 4"),
+    ('[-2, "invalid"]', '[1, 2, 3, 4, 5]', "expect.analog.'2': 5 channels, must be 1 to 4"),
+    ('[-2, "invalid"]', '[]', "expect.analog.'2': 0 channels, must be 1 to 4"),
+    ('analog = { "2"', 'analog = { "0"', "expect.analog.'0': address 0 has no 16-bit values"),
+    ('id = "00 B7 03"', 'id = "00 B7"', "slave #3 (Meter).strings.'id': 2 bytes, must be sequences of 3, at most 219"),
+    ('id = "00 B7 03"', f'id = "{"00 B7 03 " * 74}"', "slave #3 (Meter).strings.'id': 222 bytes, must be sequences"),
+    ('id = "00 2A 00 01 22"', 'id = "00 2A 00 01"', "slave #7 (Drive).strings.'id': 4 bytes, an ID object has 5"),
+    ('values = [1, [{ at = "0s"', 'values = []  # [[{ at = "0s"', "host.analog #1.values: empty list"),
+    ('do = "read_id_string"\naddress = "4"\nanswer = "00 b7 03"', 'do = "set_auto_clear"\nvalue = 1.0',
+     "host.function #2.value: 1.0 is not a number 0 to 3"),
     ('"Out" = [1, "any"]', '"In" = [1]', "expect.received.'In': not one slave with that many outputs"),
     ('"Out" = [1, "any"]', '"Gone" = [1]', "expect.received.'Gone': no slave is called 'Gone'"),
     ('{ event = "apf" }', '{ event = "APF" }', "expect.log #2.event: 'APF' is not an event: start, phase, offline"),
-    ('data = 0 }', 'data = -1 }', "expect.log #1.data: -1: Input should be greater than or equal to 0"),
+    ('data = 0 }', 'data = -1 }', "expect.log #1.data: -1: must be greater than or equal to 0"),
     ('address = "5B", data', 'address = 5, data', "expect.log #1.address: 5 is not an address: write it in quotes"),
 ]
 
@@ -543,6 +553,13 @@ def test_no_text_makes_a_traceback(text):
     with pytest.raises(PlantError) as caught:
         parse_plant(text, "p.toml")
     assert all(len(line.splitlines()) == 1 for line in caught.value.lines)
+
+
+def test_a_byte_order_mark_is_no_fault(tmp_path):
+    """PL-001: some editors write one before the text."""
+    path = tmp_path / "mark.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + SHIPPED[0].read_bytes())
+    assert load_plant(path).name == load_plant(SHIPPED[0]).name
 
 
 def test_the_shipped_plants():

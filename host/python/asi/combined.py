@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 ANALOG_WORDS = 4                       # 16-bit words of a number in AIDI and AODI
 STRING_BYTES = 224                     # FN_STRING of the host window
+SEQUENCES_BYTES = 219                  # longest string of an S-7.4 slave: 73 sequences of 3 bytes
+ID_BYTES = 5                           # ID object of a CTT2 slave; its last byte is the I/O configuration
 SAFETY_TABLE = (0b0001, 0b0101, 0b0110, 0b1001, 0b1110, 0b1011, 0b1100, 0b0111)  # a legal one, where none is given
 S74_STRINGS = {"id": 0, "diagnosis": 1, "parameters": 2}
 _CHANNELS = (1, 2, 4, 4)               # CTT1: two bits of ID2

@@ -393,6 +393,18 @@ def _contacts(value: Any) -> int:
     return parse_numbers(value, 2)
 
 
+def _name(value: Any) -> Any:
+    if isinstance(value, str) and not (1 <= len(value) <= 60 and not re.search(r"[\x00-\x1f\x7f]", value)):
+        raise ValueError(f"{_show(value)} is not a name: 1 to 60 characters, no control characters")
+    return value  # of another type: pydantic says so
+
+
+def _duration(value: Any) -> int:
+    if (time_ns := parse_time(value)) < 10_000:
+        raise ValueError(f"{_show(value)} is too short, at least 10us")
+    return time_ns
+
+
 Time = Annotated[int, BeforeValidator(parse_time)]
 SignedTime = Annotated[int, BeforeValidator(_signed_time)]
 Period = Annotated[int, BeforeValidator(_period)]
@@ -405,7 +417,7 @@ WantedWord = Annotated[Any, BeforeValidator(_wanted_word)]
 Contacts = Annotated[int, BeforeValidator(_contacts)]
 Index = Annotated[int, BeforeValidator(_index)]
 Probability = Annotated[int, BeforeValidator(_probability)]
-Name = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f\x7f]+$")]
+Name = Annotated[str, BeforeValidator(_name)]
 
 
 # ---------------------------------------------------------------- the file
@@ -556,7 +568,7 @@ class _Check(_Expect):
 class _File(_Table):
     name: Name
     description: str
-    duration: Period
+    duration: Annotated[int, BeforeValidator(_duration)]
     seed: Annotated[StrictInt, Field(ge=0, lt=2**63)] = 1
     conflicts: StrictBool = False
     host: _Host = _Host()
@@ -697,6 +709,11 @@ class _Builder:
                 number = self.string_number(kind, text)
                 if number is None:
                     raise _Fault(f"strings.{_show(text)}", f"{codes.profile} has no such string")
+                if kind.messages and number == 0 and len(data) < combined.ID_BYTES:
+                    raise _Fault(f"strings.{_show(text)}", f"{len(data)} bytes, an ID object has {combined.ID_BYTES}")
+                if not kind.messages and (len(data) % 3 or len(data) > combined.SEQUENCES_BYTES):
+                    raise _Fault(f"strings.{_show(text)}", f"{len(data)} bytes, must be sequences of 3, "
+                                                           f"at most {combined.SEQUENCES_BYTES}")
                 out["strings"][number] = data
         if kind.safety:
             safety = table.safety or _Safety()
@@ -884,6 +901,8 @@ class _Builder:
             raise _Fault("address", f"no slave of this plant has address {table.address}")
         if not kinds[0].outputs:
             raise _Fault("address", f"the slave at {table.address} has no 16-bit outputs")
+        if not table.values:
+            raise _Fault("values", "empty list")
         if len(table.values) > kinds[0].outputs:
             raise _Fault("values", f"{len(table.values)} channels, the slave has {kinds[0].outputs}")
         if table.repeat is not None and not any(isinstance(value, list) for value in table.values):
@@ -916,7 +935,7 @@ class _Builder:
             if address and address[-1] in "AB":
                 self.lettered.add(parse_index(address) & 31)
         if table.do == "set_auto_clear":
-            if isinstance(table.value, bool) or table.value not in (0, 1, 2, 3):
+            if type(table.value) is not int or not 0 <= table.value <= 3:
                 raise _Fault("value", f"{_show(table.value)} is not a number 0 to 3")
             first = table.value
             words.append(str(first))
@@ -950,7 +969,10 @@ class _Builder:
         inputs, parameters, analog = ({self.key(name, text): value for text, value in getattr(table, name).items()}
                                       for name in ("inputs", "parameters", "analog"))
         for index, words in analog.items():
-            _with_key(f"analog.'{index_name(index)}'", lambda i=index, w=words: combined.word_at(i, len(w) - 1))
+            most = 0 if index == 0 else 2 if index > 32 else combined.ANALOG_WORDS
+            if not 1 <= len(words) <= most:
+                raise _Fault(f"analog.'{index_name(index)}'", f"{len(words)} channels, must be 1 to {most}" if most else
+                             "address 0 has no 16-bit values")
         received = {}
         for text, words in table.received.items():
             found = self.guard_key(f"received.{_show(text)}", lambda t=text: self.find(t))
@@ -1039,7 +1061,7 @@ _KINDS = {"model_type": "a table", "list_type": "a list", "dict_type": "a table"
 
 
 def _reason(error: dict) -> str:
-    reason = _REASONS.get(error["type"]) or error["msg"].removeprefix("Value error, ")
+    reason = _REASONS.get(error["type"]) or error["msg"].removeprefix("Value error, ").replace("Input should", "must")
     if error["type"] in _KINDS:
         reason = f"{_show(error['input'])} is not {_KINDS[error['type']]}"
     elif error["type"] not in (*_REASONS, "value_error"):
@@ -1068,7 +1090,7 @@ def parse_plant(text: str, path: str = "plant.toml") -> Plant:
 def load_plant(path: str | Path) -> Plant:
     """Read and check a plant file; PlantError for everything that is wrong with it, unreadable files included."""
     try:
-        text = Path(path).read_bytes().decode("utf-8")
+        text = Path(path).read_bytes().decode("utf-8-sig")  # some editors put a mark before the text
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "not UTF-8 text"
         raise PlantError([f"{path}: file: {reason}"]) from None

@@ -319,9 +319,17 @@ def history_lines(history: dict[str, Any]) -> list[str]:
     return out or ["nothing to tell"]
 
 
+STORAGE_AT_START = {"EMPTY": "flash was empty at the start", "LOADED": "loaded from flash at the start",
+                    "CORRUPT": "flash was CORRUPT at the start, defaults in use"}
+
+
 def storage_line(storage: dict[str, Any]) -> str:
-    marks = [name for name in ("busy", "failed", "saved") if storage[name]]
-    return ", ".join([storage["state"], *marks, f"set {storage['sequence']}"])
+    """In words, for people: a board without flash is a plain state, no failure."""
+    if storage["state"] == "NO_FLASH":
+        return "no flash: nothing is kept over power-off"
+    now = ("storing" if storage["busy"] else "storing FAILED: the data in use is not in flash" if storage["failed"] else
+           f"the data in use is stored, set {storage['sequence']}" if storage["saved"] else "nothing stored since")
+    return f"{STORAGE_AT_START.get(storage['state'], storage['state'])}; {now}"
 
 
 def _checks(checks: list[dict[str, Any]]) -> Text:

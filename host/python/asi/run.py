@@ -181,7 +181,7 @@ class Runner:
                 self.play(log)
             except KeyboardInterrupt:
                 interrupted = True
-            except (SimulationError, WindowError, FunctionError) as fault:
+            except (SimulationError, WindowError, FunctionError, RuntimeError) as fault:  # the last: refused by the bench
                 error = str(fault)
             log.add(self.bench.telegrams())
             wall_s = time.monotonic() - started
@@ -211,6 +211,8 @@ class Runner:
     def receives(self, position: int) -> list[int | None]:
         """Output words that a simulated slave has received."""
         heard = self.plant.slaves[position].kind.heard
+        if position >= len(self._handles):  # the run failed before
+            return [None] * heard
         return [self.bench.get_value(self._handles[position], channel) for channel in range(heard)]
 
     # ------------------------------------------------------------ the loop
