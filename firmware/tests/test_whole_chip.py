@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The firmware on the whole Verilated chip with a flash: permanent data over power-off, power cuts, spoilt flash; 16-bit
-values end to end. Every byte of a cut is tried natively (test_store.py); here samples show that the chip does the same."""
+"""The firmware on the whole Verilated chip with a flash: permanent data over power-off, power cuts, spoilt flash;
+16-bit values end to end. Every byte of a cut is tried natively (test_store.py); samples show that the chip does the same."""
 import os
 import random
 import struct
@@ -116,9 +116,9 @@ def test_projection_survives(flash):
     what the first parameters on the line are."""
     codes = Codes(3, 1, 0xF, 0xE)
     deeds = [lambda w: w.store_configuration(), lambda w: w.set_permanent_parameter(1, 6),
-             lambda w: (w.write_parameter(2, 9), w.store_parameters()), lambda w: w.set_permanent_configuration(9, codes),
-             lambda w: w.set_lps({1, 2, 37, 9}), lambda w: w.set_lps({1, 2, 37}), lambda w: w.set_mode(True),
-             lambda w: w.set_auto_address(True)]
+             lambda w: (w.write_parameter(2, 9), w.store_parameters()),
+             lambda w: w.set_permanent_configuration(9, codes), lambda w: w.set_lps({1, 2, 37, 9}),
+             lambda w: w.set_lps({1, 2, 37}), lambda w: w.set_mode(True), lambda w: w.set_auto_address(True)]
     expected, sequence = DEFAULTS, 0
     for deed in (*deeds, None):
         with Bench(flash, NETWORK) as bench:
@@ -145,8 +145,8 @@ def test_projection_survives(flash):
 
 
 def test_commit_survives(flash):
-    """NV-001, NV-006, NV-009, HW-002: a commit is stored once; the same again is not; the product's image starts with it
-    too, and nothing outside the storage is written."""
+    """NV-001, NV-006, NV-009, HW-002: a commit is stored once; the same again is not; the product's image starts with
+    it too, and nothing outside the storage is written."""
     outside = flash.peek(0, AREA), flash.peek(AREA + AREA_BYTES, flash.size - AREA - AREA_BYTES)
     with Bench(flash) as bench:
         for _ in range(2):
@@ -224,8 +224,8 @@ def payload(modes, lps=0):
 @pytest.mark.parametrize("what,state", [("none", NO_FLASH), ("erased", EMPTY), ("nonsense", CORRUPT), ("torn", CORRUPT),
                                         ("impossible modes", CORRUPT), ("good", LOADED)])
 def test_what_is_found_at_start(flash, what, state):
-    """NV-005, NV-003, HW-010, EX-025: no flash, an empty, spoilt or senseless one: defaults, the state and the START event
-    tell, the line comes up; what is stored then is found by the next start."""
+    """NV-005, NV-003, HW-010, EX-025: no flash, an empty, spoilt or senseless one: defaults, the state and the START
+    event tell, the line comes up; what is stored then is found by the next start."""
     good = record(0, 7, payload(0b100, lps=0b110))
     content = {"nonsense": random.Random(3).randbytes(AREA_BYTES), "torn": good[:100], "good": good,
                "impossible modes": record(0, 7, payload(0b110 | 1 << 4))}.get(what, b"")  # auto clear, auto address
