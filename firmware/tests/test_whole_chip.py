@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The firmware on the whole Verilated chip with a flash: permanent data over power-off, power cuts, spoilt flash;
-16-bit values end to end. Every byte of a cut is tried natively (test_store.py); samples show that the chip does the same."""
+16-bit values end to end. Every byte of a cut is tried natively (test_store.py), samples of them here."""
+import json
 import os
 import random
 import struct
@@ -9,8 +10,9 @@ import zlib
 
 import pytest
 from native import ROOT
+from typer.testing import CliRunner
 
-from asi import regmap
+from asi import cli, regmap
 from asi.native import Chip, Flash
 from asi.plant import Codes, Host
 from asi.status import LogEvent
@@ -247,6 +249,24 @@ def test_what_is_found_at_start(flash, what, state):
     if what != "none":
         with Bench(flash) as bench:
             assert bench.state == LOADED and bench.permanent() == stored
+
+
+def test_runs_with_a_flash_file(tmp_path):
+    """NV-001, NV-006, NV-009, PL-002: two runs of a plant with one flash file: the first stores what its host commits,
+    the second starts with it and stores nothing."""
+    file, reports = tmp_path / "plant.flash", []
+    for _ in range(2):
+        result = CliRunner().invoke(cli.app, ["run", str(ROOT / "sim/plants/packaging.toml"), "--quick",
+                                              "--time", "130ms", "--no-log", "--no-html", "--out", str(tmp_path), "--flash", str(file),
+                                              "--firmware", str(ROOT / "build/firmware/asi_test.hex")])
+        assert result.exit_code == 0, result.output
+        reports.append(json.loads((tmp_path / "report.json").read_text()))
+        content = file.read_bytes()
+        assert content[AREA:AREA + 4] == b"ASIP" and content[:AREA] == b"\xFF" * AREA
+    assert [r["storage"] for r in reports] == [
+        {"state": state, "busy": False, "failed": False, "saved": True, "sequence": 1} for state in (EMPTY, LOADED)]
+    stored = [[e for e in r["events"] if e["event"] == "stored"] for r in reports]
+    assert [len(events) for events in stored] == [1, 0]
 
 
 def test_values_end_to_end():
