@@ -195,6 +195,7 @@ static void keep_permanent(const asi_ec_t *ec)
         return;
     shown_permanent = asi_ec_state(ec)->permanent_version;
     asi_persist_request(&ec->permanent);
+    WIN(STORE)[0] = asi_persist_word(); /* before the answer: who has that never reads `saved` of the data before */
 }
 
 /** @return true: what was copied may be half of the next commit */

@@ -181,6 +181,26 @@ def test_functions_in_line():
     assert chip.item("PP", 7, 1) == 11  # not done again
 
 
+def test_strings_in_line():
+    """HW-008, FN-028, FN-030, FN-032: the string of a function that waits is not spoilt by the answer of the one
+    before, which nobody can read any more."""
+    double = Ctt1(strings={ctt_table.CTT1_PAR_ID: STRING})
+    chip = Chip(network() + [Ctt1Slave(8, 0xC, double)]).start()
+    for _ in range(20):
+        chip.cycle()
+    chip.ask(30, 8)
+    for _ in range(4):
+        chip.step()
+    assert not chip.answered and chip.read("CTT_STATE", 2) & 0x80
+    text = bytes.fromhex("11 22 33 44 55 66 77 88 99 AA BB CC")
+    chip.ask(28, 8, string=text)
+    chip.until(lambda: chip.answered, 400)
+    assert chip.read("FN_STATUS") == 0 and chip.read("FN_DONE") == 2
+    # the master sets F and V, the last bits of each sequence
+    assert double.written is not None and len(double.written) == 12
+    assert all((a ^ b) & (0xFC if k % 3 == 2 else 0xFF) == 0 for k, (a, b) in enumerate(zip(double.written, text)))
+
+
 def test_function_ends_as_aborted():
     """HW-008, FN-033: OFFLINE in the middle: the open function is answered with ABORTED, the next one is taken."""
     chip = Chip(network()).start()
@@ -328,8 +348,12 @@ def test_log_overflow():
         chip.cycle()
     head = chip.read("LOG_HEAD")
     chip.slaves.clear()
-    chip.until(lambda: not chip.list("LDS"), 8)
-    assert chip.read("LOG_HEAD") - head >= 124
+    chip.run = lambda: chip  # the firmware is late, or they come in two halves
+    for _ in range(6):
+        chip.cycle()
+    del chip.run
+    chip.run()
+    assert chip.list("LDS") == set() and chip.read("LOG_HEAD") - head == 125
     events = [(event, index) for _, event, index, _ in chip.events()]
     pairs = [(event, index) for index in range(1, 64) for event in (DEACTIVATED, GONE) if index != 32]
     tail = [e for e in events if e[0] in (DEACTIVATED, GONE)]
