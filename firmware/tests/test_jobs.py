@@ -390,6 +390,19 @@ def test_broadcast_reset():
     m.agree()
 
 
+def test_broadcast_reset_and_data_exchange():
+    """FN-022, EX-024: data exchange that comes back meanwhile does not cut the pause after BR01 short."""
+    m = Line([std(3), std(4)]).start().cycles(5)
+    assert m.do(EXECUTE, 31, 21) == 0
+    at = m.port.time_us
+    m.slaves[0].heard.clear()
+    assert m.controls(data_exchange=0) == 0 == m.controls(data_exchange=1)
+    while m.slaves[0].heard["WPAR"] == 0:
+        m.step()
+    assert m.port.time_us - at >= RESET_US
+    m.agree()
+
+
 # ------------------------------------------------------------------------------------------ address change
 def test_change_of_a_standard_slave():
     """FN-020, AD-002, AD-004, AD-005, AD-006, FN-032: call by call, one per management slot, while the others go on."""
@@ -662,6 +675,97 @@ def test_abort_at_every_step(how):
         assert m.begin(EXECUTE, 4, 16) == 0
 
 
+def left_behind(scene, how, heard, step, protected=False, auto=False):
+    """A change broken off before call `step` of it, the answer to the last call before lost or not; the next start is
+    over. -> line, or None: the change had ended before"""
+    slaves, old, new = SCENES[scene]
+    here = slaves()
+    m = Line(here, projected=here if protected else (), protected=protected, auto=auto).start().rounds(1)
+    m.fault = lambda k, call, attempt: heard if k >= step - 1 else None
+    if how == "exchange":
+        m.controls(data_exchange=0)
+    del m.calls[:]
+    assert m.begin(CHANGE, old, new) == 0
+    m.until(lambda: len(m.calls) == step or m.job().status != BUSY)
+    if m.job().status != BUSY:
+        return None
+    if how == "offline":
+        m.controls(offline=1)
+        m.cycles(3)
+        m.controls(offline=0)
+    elif how == "power":
+        m.power(True)
+        m.cycles(3)
+        m.power(False)
+    elif how == "exchange":
+        m.controls(data_exchange=1)
+    m.until(lambda: m.job().status != BUSY)
+    assert m.job().status == ABORT
+    m.fault = lambda k, call, attempt: None
+    m.until(lambda: m.read()["phase"] == DATA_EXCHANGE)
+    return m
+
+
+@pytest.mark.parametrize("how", ["offline", "power", "exchange"])
+@pytest.mark.parametrize("scene", ["standard", "a to b", "b to a"])
+def test_a_slave_left_behind_can_be_addressed(scene, how):
+    """FN-033, AD-001, AD-002, AD-007, EX-032: OFFLINE, power fail or a new activation leave the slave at its old
+    address, its new one or 0: there it is found in either mode, LDS.0 shows it, the change to protected mode is refused,
+    and function 20 brings it back."""
+    old, places = SCENES[scene][1], Counter()
+    for protected in (False, True):
+        for heard in (None, "mute"):
+            for step in range(1, clean_length(scene) + 1):
+                m = left_behind(scene, how, heard, step, protected)
+                if m is None:
+                    break
+                slave = m.slaves[0]
+                m.until(lambda: {s.index for s in m.slaves} == m.read()["lds"], 400)
+                places[slave.index] += 1
+                where = (protected, heard, step, slave.index)
+                assert ("lds0" in m.read()["flags"]) == (slave.index == 0), where
+                if slave.index == 0 and not protected:
+                    assert m.controls(protected_mode=1) == SLAVE0, where
+                if slave.index != old:
+                    assert m.do(CHANGE, slave.index, old) == 0, where
+                m.until(lambda: m.read()["las"] == m.read()["lds"] == {s.index for s in m.slaves}, 400)
+                assert old in m.read()["las"] and ("config_ok" in m.read()["flags"]) == protected, where
+                if not protected:
+                    m.protected = True
+                    m.lps, m.pcd = {s.index for s in m.slaves}, m.read()["cdi"]
+                    assert m.lib.fw_store_configuration() == 0 and m.controls(protected_mode=1) == 0, where
+                    m.until(lambda: "config_ok" in m.read()["flags"] and old in m.read()["las"], 400)
+    assert places[old] and (places[0] or how == "power")  # what was deleted is not lost with the supply
+
+
+@pytest.mark.parametrize("scene", ["standard", "a to b"])
+def test_a_slave_left_behind_at_the_next_power_up(scene):
+    """AD-001, EX-002, EX-032, FN-020: the master itself starts anew in protected mode with the slave at 0: the others
+    are active, the slave is shown, and function 20 brings it back."""
+    m = left_behind(scene, "offline", None, 2, protected=True)
+    assert m.slaves[0].index == 0
+    old = SCENES[scene][1]
+    gone = Line(m.slaves)
+    gone.lps, gone.pcd, gone.protected = m.lps, m.pcd, True
+    lps = sum(1 << i for i in m.lps)
+    start = {"lps": [lps & 0xFFFFFFFF, lps >> 32], "pcd": m.pcd, "pp": [15] * 64,
+             "controls": {"protected_mode": 1, "data_exchange": 1}}
+    assert gone.lib.fw_init(gone.ffi.new("fw_permanent *", start)) == 0
+    gone.port.time_us = 0
+    gone.start()
+    assert gone.agree().read()["las"] == gone.lps - {old} and "lds0" in gone.read()["flags"]
+    assert gone.do(CHANGE, 0, old) == 0
+    assert "config_ok" in gone.agree().read()["flags"]
+
+
+def test_a_slave_left_behind_and_automatic_addressing():
+    """AD-008, FN-033: with automatic addressing the slave left at 0 is the missing one and gets its address back."""
+    for scene in ("standard", "a to b", "b to a"):
+        m = left_behind(scene, "offline", None, 2, protected=True, auto=True)
+        m.until(lambda: SCENES[scene][1] in m.read()["las"], 400)
+        assert "config_ok" in m.agree().read()["flags"]
+
+
 # ------------------------------------------------------------------------------------------ ID1 at address 0
 def test_write_id1():
     """FN-024: written, waited for, read back, shown in CDI; nothing else."""
@@ -802,6 +906,29 @@ def test_failed_automatic_addressing_waits():
     start = m.port.time_us
     m.until(lambda: 9 in m.read()["las"])
     assert m.port.time_us - start < 1_000_000
+    m.agree()
+
+
+@pytest.mark.parametrize("how", ["offline", "power", "exchange"])
+def test_aborted_automatic_addressing(how):
+    """AD-009, AD-010, FN-033: OFFLINE or a new activation in the middle is no failure of slave 0: no P_AUTO_WAIT."""
+    m, new = replaced(std, 9)
+    m.controls(data_exchange=how != "exchange")
+    new.present = True
+    m.until(lambda: m.names() == ["RID1 0"])
+    if how == "offline":
+        m.controls(offline=1)
+        m.cycles(3)
+        m.controls(offline=0)
+    elif how == "power":
+        m.power(True)
+        m.cycles(3)
+        m.power(False)
+    else:
+        m.controls(data_exchange=1)
+    start = m.port.time_us
+    m.until(lambda: 9 in m.read()["las"])
+    assert m.port.time_us - start < 700_000 and m.events(ADDRESSED) == [(9, -ABORT << 8), (9, 0)]
     m.agree()
 
 
