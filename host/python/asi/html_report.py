@@ -319,7 +319,7 @@ def _process(report: dict[str, Any]) -> str:
                  str(row["channel"]), _value(report, f"analog.{k}.value", _word),
                  _valid(report, k, row), _value(report, f"analog.{k}.received", _word)]
                 for k, row in enumerate(report["analog"])]
-        head = ("Address", "Name", "Kind", "", "Channel", "Value", "Mark", "Received by the slave")
+        head = ("Address", "Name", "Kind", "Direction", "Channel", "Value", "Mark", "Received by the slave")
         out.append(_section("16-bit values", _table("analog", "16-bit values", head, rows), "values"))
     if report["functions"]:
         rows = [[escape(row["function"]), _value(report, f"functions.{k}.at_ns", _ms),
