@@ -4,8 +4,10 @@
 
 usage: gen_ctt.py [--check]
   --check  change nothing; exit 1 and name the files that differ
+exit code 2: rdl/ctt.toml is not usable; one line says why, and nothing was written
 """
 import argparse
+import re
 import sys
 import tomllib
 from pathlib import Path
@@ -19,11 +21,21 @@ def rows(text):
     """TOML text -> [(group, key, value, experimental, doc)]; ValueError when a row lacks one of them."""
     out = []
     for group, keys in tomllib.loads(text).items():
+        if not isinstance(keys, dict):
+            raise ValueError(f"{group}: a key outside of a table")
         for key, row in keys.items():
-            if set(row) != {"value", "exp", "doc"} or not isinstance(row["value"], int):
-                raise ValueError(f"rdl/ctt.toml: {group}.{key}: needs value (an integer), exp and doc, and nothing else")
+            if (not isinstance(row, dict) or set(row) != {"value", "exp", "doc"} or type(row["value"]) is not int
+                    or not isinstance(row["exp"], bool) or not isinstance(row["doc"], str)):
+                raise ValueError(f"{group}.{key}: needs value (an integer), exp (true or false) and doc, nothing else")
             out.append((group, key, row["value"], row["exp"], row["doc"]))
     return out
+
+
+def used():
+    """Names of constants that the firmware and the native slaves ask for, e.g. CTT1_TOGGLE_POS."""
+    files = [*(ROOT / "firmware/core").glob("*.[ch]"), *(ROOT / "tb").glob("*.cpp")]
+    name = re.compile(r"\bASI_((?:CTT[1-5]|SAFETY)_[A-Z0-9_]+)\b")
+    return {found for file in files for found in name.findall(file.read_text())}
 
 
 def c_header(table):
@@ -56,7 +68,13 @@ def main(argv=None):
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--check", action="store_true")
     args = p.parse_args(argv)
-    table = rows((ROOT / "rdl/ctt.toml").read_text())
+    try:
+        table = rows((ROOT / "rdl/ctt.toml").read_text())
+        if gone := sorted(used() - {f"{group}_{key}".upper() for group, key, *_ in table}):
+            raise ValueError(f"missing, but in use: {', '.join(gone)}")
+    except ValueError as error:  # TOML that is none as well
+        print(f"rdl/ctt.toml: {error}", file=sys.stderr)
+        return 2
     page = ROOT / "docs/combined_transactions.md"
     outputs = {ROOT / "firmware/generated/asi_ctt_table.h": c_header(table),
                ROOT / "host/python/asi/ctt_table.py": python_module(table),

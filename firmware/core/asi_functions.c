@@ -120,8 +120,8 @@ static asi_status_t check_modes(bool protected_mode, bool auto_address, unsigned
     return auto_clear && (auto_address || !protected_mode) ? ASI_E_AUTO_CLEAR_MODE : ASI_OK;
 }
 
-/** No data, no values: substitutes instead of the last ones, and an open string or message ends (CT-005). When data exchange
- * comes back all of LAS is activated anew, and the engines with it. */
+/** No data, no values: substitutes instead of the last ones, and an open string or message ends (CT-005). When data
+ * exchange comes back all of LAS is activated anew, and the engines with it. */
 static void stop_transactions(asi_ec_t *ec)
 {
     for (unsigned i = asi_list_next(&ec->state.las, 0u); i < ASI_INDICES; i = asi_list_next(&ec->state.las, i + 1u))

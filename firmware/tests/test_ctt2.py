@@ -189,8 +189,8 @@ def test_response_time_out():
 
 
 def test_clock_that_never_rests():
-    """CT-022, FN-031, CT-005: a slave that moves its clock for ever leaves no gap to ask in: the values are invalid and an open
-    message ends after the response time-out, at the latest; when the clock rests everything goes on."""
+    """CT-022, FN-031, CT-005: a slave that moves its clock for ever leaves no gap to ask in: the values are invalid and
+    an open message ends after the response time-out, at the latest; when the clock rests everything goes on."""
     class Restless(Ctt2):
         mad = False
         toggle = 0

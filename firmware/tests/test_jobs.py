@@ -1093,8 +1093,8 @@ def test_string_of_a_lost_slave(fake_strings):
 @pytest.mark.parametrize("function, index", [(READ_ID, 3), (WRITE_STRING, 3), (MESSAGE, 7)])
 @pytest.mark.parametrize("when", [0, 1, 2, 5])
 def test_string_and_data_exchange(fake_strings, function, index, when):
-    """FN-019, FN-027, FN-028, FN-031, FN-032: the bytes move with the data: without it strings are refused, and one that is
-    under way ends as ABORTED in a few cycles, so that it does not stand in the way of other functions."""
+    """FN-019, FN-027, FN-028, FN-031, FN-032: the bytes move with the data: without it strings are refused, and one
+    that is under way ends as ABORTED in a few cycles, so that it does not stand in the way of other functions."""
     m = strings_line(fake_strings)
     assert m.begin(function, index, 0, b"abc") == 0
     m.cycles(when)

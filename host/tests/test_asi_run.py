@@ -264,7 +264,7 @@ def test_failures_of_the_chip_are_named(tmp_path, bench, text):
 
 
 def test_what_the_simulation_refuses_is_a_failed_run(tmp_path):
-    """PL-002: a slave that the simulation does not take, and that no check of the plant knew: a report, no traceback."""
+    """PL-002: a slave that the simulation does not take, that no check of the plant knew: a report."""
     bench = FakeBench()
 
     def add(slave):
@@ -279,7 +279,8 @@ def test_what_the_simulation_refuses_is_a_failed_run(tmp_path):
     (("EMPTY", False, False, False, 0), "flash was empty at the start; nothing stored since"),
     (("EMPTY", True, False, False, 0), "flash was empty at the start; storing"),
     (("LOADED", False, False, True, 7), "loaded from flash at the start; the data in use is stored, set 7"),
-    (("LOADED", False, True, False, 7), "loaded from flash at the start; storing FAILED: the data in use is not in flash"),
+    (("LOADED", False, True, False, 7),
+     "loaded from flash at the start; storing FAILED: the data in use is not in flash"),
     (("CORRUPT", False, False, True, 1),
      "flash was CORRUPT at the start, defaults in use; the data in use is stored, set 1")])
 def test_storage_in_words(storage, text):

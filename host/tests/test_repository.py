@@ -23,6 +23,25 @@ def test_registers_are_generated():
     run(sys.executable, "tools/gen_ctt.py", "--check")
 
 
+@pytest.mark.parametrize("old, new, reason", [
+    ("toggle_pos ", "toggle_po ", "missing, but in use: CTT1_TOGGLE_POS"),
+    ("value = 3,", "value = \"3\",", "ctt1.toggle_pos: "),
+    ("value = 3,", "", "ctt1.toggle_pos: needs value"), ("[ctt1]", "a = 1\n[ctt1]", "a: a key outside of a table"),
+    ("[ctt1]", "[ctt1", "Expected ']'"), ("exp = true, doc", "exp = 1, doc", "ctt1.toggle_pos: ")])
+def test_choices_of_the_combined_transactions_are_checked(old, new, reason, tmp_path, monkeypatch, capsys):
+    """CT-001: a bad rdl/ctt.toml gives one line and exit code 2, and nothing is written."""
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    import gen_ctt
+    (tmp_path / "rdl").mkdir()
+    (tmp_path / "rdl/ctt.toml").write_text((ROOT / "rdl/ctt.toml").read_text().replace(old, new, 1))
+    for folder in ("firmware", "tb"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
+    monkeypatch.setattr(gen_ctt, "ROOT", tmp_path)
+    assert gen_ctt.main([]) == 2
+    message = capsys.readouterr().err
+    assert message.startswith(f"rdl/ctt.toml: {reason}") and message.count("\n") == 1
+
+
 def test_matrix_is_generated():
     """PL-002: docs/verification.md is current and every requirement has a test (make matrix)."""
     run(sys.executable, "tools/matrix.py", "--check")

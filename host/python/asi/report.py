@@ -310,7 +310,8 @@ def history_lines(history: dict[str, Any]) -> list[str]:
     """History in words, for the terminal and the page."""
     out = []
     if history["changed_us"] is not None:
-        out.append(f"Config_OK was last broken at {history['changed_us'] / 1e3:.3f} ms by {' '.join(history['changed'])}")
+        out.append(f"Config_OK was last broken at {history['changed_us'] / 1e3:.3f} ms "
+                   f"by {' '.join(history['changed'])}")
     if history["last_offline_cause"]:
         out.append(f"offline because of {', '.join(history['offline_causes'])}; last {history['last_offline_cause']} "
                    f"at {history['offline_us'] / 1e3:.3f} ms")

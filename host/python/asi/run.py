@@ -181,7 +181,7 @@ class Runner:
                 self.play(log)
             except KeyboardInterrupt:
                 interrupted = True
-            except (SimulationError, WindowError, FunctionError, RuntimeError) as fault:  # the last: refused by the bench
+            except (SimulationError, WindowError, FunctionError, RuntimeError) as fault:  # RuntimeError: of the bench
                 error = str(fault)
             log.add(self.bench.telegrams())
             wall_s = time.monotonic() - started
