@@ -4,7 +4,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import cocotb
-from asi.plant import load_plant
+from asi.plant import load_plant, parse_plant
 from asi.regmap import ErrorClass, Phase
 from asi.telegram import decode_call, encode_call
 from cocotb.triggers import RisingEdge, Timer
@@ -78,6 +78,83 @@ async def plant_combined(dut):
 async def plant_replacement(dut):
     """PL-004, FN-020: change_address, parameters and automatic addressing of a replaced slave."""
     await play(dut, "replacement")
+
+
+WRONG = """
+name = "Wrong on purpose"
+description = "Every kind of expectation is missed once."
+duration = "1200ms"
+
+[host]
+mode = "protected"
+analog = [{ address = "3", values = [7] }]
+
+[[host.function]]
+at = "1090ms"
+do = "write_parameter"
+address = "9"
+value = "0101"
+
+[[slave]]
+address = "1"
+profile = "S-7.3.D"
+values = [1, 2]
+
+[[slave]]
+address = "2"
+profile = "S-0.B.0"
+
+[[slave]]
+address = "3"
+profile = "S-7.3.4"
+
+[[event]]
+at = "1090ms"
+do = "overflow"
+slave = "1"
+value = [1]
+
+[[event]]
+at = "1090ms"
+do = "contacts"
+slave = "2"
+value = []
+
+[[event]]
+at = "1090ms"
+do = "replace"
+slave = "3"
+
+[[check]]
+at = "1090ms"
+analog = { "1" = [1, 9] }
+received = { "3" = [8] }
+log = [{ event = "apf" }]
+
+[expect]
+las = ["1-3"]
+inputs = { "2" = "0001" }
+analog = { "1" = ["any", 2] }
+flags = { lds0 = false }
+"""
+
+
+@cocotb.test(timeout_time=300, timeout_unit="ms")
+async def plant_that_is_wrong(dut):
+    """PL-004: a plant on the RTL is not met without its values, flags, lists, log and functions, each named."""
+    player = Player(dut, parse_plant(WRONG).with_settle(SETTLE_NS))
+    try:
+        await player.play()
+    except AssertionError as error:
+        said = str(error)
+    else:
+        raise AssertionError("nothing was missed")
+    for part in ("check at 110 ms not met: value 1 channel 2 is 0002 (2), expected 0009 (9)",
+                 "slave #3 channel 1 received 0007 (7), expected 0008 (8)", "log: no apf",
+                 "write_parameter 9 0101: NOT_ACTIVE, expected OK", "LAS missing: 3", "lds0 is 1, expected 0",
+                 "input 2 is 0000, expected 0001"):
+        assert part in said, f"{part!r} is not in {said!r}"
+    assert "value 1 channel 1" not in said and said.count("not met") == 3
 
 
 @cocotb.test(timeout_time=300, timeout_unit="ms")

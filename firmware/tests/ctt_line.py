@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A line that loses calls, with one slave of cocotb_tests/models/ctt.py on it, for the tests of the engines.
 
-The slaves here are the models with probes: what they took, when they ask for a value, and answers that a good slave would
-not give. Nibbles are at line level, as the models want them.
+The slaves here are the models with probes: what they took, when they ask for a value, and answers that a good slave
+would not give. Nibbles are at line level, as the models want them.
 """
 from asi import ctt_table as table
 

@@ -457,7 +457,7 @@ def test_hold_without_string(output):
             for _ in range(30):
                 line.call()
                 assert output or (line.ai[0] in fed + [0x7FFF] and line.ai[1] in fed + [0x7FFF])
-            assert not output or (set(slave.values_taken[0]) <= {0, 0x1234} and set(slave.values_taken[1]) <= {0, 0x5678})
+            assert not output or set(slave.taken) <= {(0, 0), (0, 0x1234), (1, 0), (1, 0x5678)}
 
 
 # ---------------------------------------------------------------- any disturbance

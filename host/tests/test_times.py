@@ -17,7 +17,7 @@ def test_failed_slave():
 
 
 def test_returned_slave():
-    """EX-030, EX-029: back in the cycle in time, first, middle and last address; never more than one extra call a cycle."""
+    """EX-030, EX-029: back in the cycle in time, first, middle and last address; at most one extra call a cycle."""
     worst, line = times.returned([(1, 60), (16, 83), (31, 129)])
     assert worst <= times.GOALS["returned_ms"] and times.extra_calls(line.log) == 1
 
