@@ -2,7 +2,7 @@
 """The host window of the firmware image on the soft core: mailbox of functions, 16-bit values, log and history."""
 import pytest
 from ctt_doubles import Ctt1
-from fake_chip import MAX_CLOCKS, Chip, host_at
+from fake_chip import HOST_ATTN, MAX_CLOCKS, SLAVE_LOST, Chip, host_at, link_at
 from fake_line import Slave
 from test_image import full_network, network
 
@@ -257,7 +257,7 @@ def test_auto_clear_is_not_left_in_passing():
     assert [event for _, event, *_ in chip.events()].count(AUTO_CLEAR) == 1
     chip.put("PP", 2, 1, 3)
     chip.write("HOST_SEQ", chip.read("HOST_SEQ") + 1)
-    chip.event(1 << 5)
+    chip.event(HOST_ATTN)
     assert chip.read("FW_RESULT") == 0 and chip.read("FW_SEQ") == chip.read("HOST_SEQ")
     sent = len(chip.log)
     for _ in range(20):
@@ -265,8 +265,38 @@ def test_auto_clear_is_not_left_in_passing():
     assert len(chip.log) == sent and chip.read("PHASE") == 0
     chip.write("HOST_CTRL", PROTECTED_BIT | EXCHANGE_BIT)
     chip.write("HOST_SEQ", chip.read("HOST_SEQ") + 1)
-    chip.event(1 << 5)
+    chip.event(HOST_ATTN)
     chip.until(lambda: chip.list("LAS") == {2, 34} and chip.read("PHASE") == 3)
+
+
+@pytest.mark.parametrize("clocks", [0, 1_000, 2_500, 4_000, 6_000, 12_000])
+def test_auto_clear_during_a_commit(clocks):
+    """HW-002, EX-033: auto clear stops the line while the firmware is taking a commit about something else, early or
+    late in it: the commit is taken and the line stays off."""
+    chip = Chip(network()).start()
+    chip.cycle()
+    assert chip.function(10)[0] == chip.function(17, 1)[0] == chip.function(33, 1)[0] == 0
+    chip.until(lambda: chip.read("PHASE") == 3)
+    for _ in range(3):
+        chip.cycle()
+    chip.slaves.pop(0)
+    while chip.link[link_at("SLOT_STATE") // 4 + 1] >> 16 & 7 < 2:
+        chip.cycle()
+    chip.run = lambda: chip
+    chip.cycle()  # the third: what it raises comes later
+    events, chip.r.event = chip.r.event, HOST_ATTN
+    chip.put("PP", 2, 1, 3)
+    chip.write("HOST_SEQ", chip.read("HOST_SEQ") + 1)
+    chip.lib.soc_clocks(clocks)
+    chip.r.event |= events
+    del chip.run
+    chip.run()
+    assert events & SLAVE_LOST and chip.read("FW_SEQ") == chip.read("HOST_SEQ") and chip.read("FW_RESULT") == 0
+    assert chip.list("LPS") == {1, 2, 34} and chip.read("HOST_CTRL") & OFFLINE_BIT
+    sent = len(chip.log)
+    for _ in range(20):
+        chip.step()
+    assert len(chip.log) == sent and chip.read("PHASE") == 0
 
 
 def test_monitor_stays_silent():

@@ -257,8 +257,9 @@ def test_runs_with_a_flash_file(tmp_path):
     file, reports = tmp_path / "plant.flash", []
     for _ in range(2):
         result = CliRunner().invoke(cli.app, ["run", str(ROOT / "sim/plants/packaging.toml"), "--quick",
-                                              "--time", "130ms", "--no-log", "--no-html", "--out", str(tmp_path), "--flash", str(file),
-                                              "--firmware", str(ROOT / "build/firmware/asi_test.hex")])
+                                              "--time", "130ms", "--no-log", "--no-html", "--out", str(tmp_path),
+                                              "--flash", str(file), "--firmware",
+                                              str(ROOT / "build/firmware/asi_test.hex")])
         assert result.exit_code == 0, result.output
         reports.append(json.loads((tmp_path / "report.json").read_text()))
         content = file.read_bytes()
