@@ -214,12 +214,16 @@ class World:
 
 
 EPISODE = 2_000  # cycles with one plant and host
+SHOW = 25_000    # cycles between two lines of progress
 
 
 def soak(seed, cycles):
     """-> cycles run. A seed and a number name an episode: soak(seed, n) starts with the episodes of soak(seed, n - 1)."""
-    done = episode = 0
+    done = episode = shown = 0
     while done < cycles:
+        if done - shown >= SHOW:
+            shown = done
+            print(f"seed {seed}: {done} cycles", flush=True)
         name = seed * 1_000_000 + episode
         try:
             done += World(name).run(min(EPISODE, cycles - done)).home().m.cycle_number

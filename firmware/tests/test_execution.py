@@ -688,6 +688,7 @@ def test_auto_clear(mode, fault):
     s = m.read()
     assert s["phase"] == OFFLINE and "offline_ready" in s["flags"] and s["offline_causes"] == 1 | 1 << 4 | 4 << 16
     assert m.controls()["offline"] and m.control(data_exchange=False) == AUTO_CLEAR
+    assert m.control(auto_clear=mode) == 0 and m.control(data_exchange=False) == AUTO_CLEAR  # the end state stays
     slaves[0].present, slaves[1].fault = True, False
     assert m.control(offline=False) == 0
     m.until(lambda s: s["phase"] == DATA_EXCHANGE)
@@ -823,6 +824,54 @@ def test_event_log():
     assert lds == m.read()["lds"]
 
 
+def test_reports_that_do_not_fit():
+    """EX-025: a batch of another length, reports of another phase: refused or without effect, nothing changes."""
+    m = Master(full_network())
+    m.lib.fw_exchange_done()
+    m.settle()
+    m.tick()
+    assert m.read()["phase"] == DETECTION and m.port.batch_len == 32
+    before = m.read()
+    assert m.lib.fw_batch_done([(0, 0, 0)] * 31, 31) == BAD_STATE == m.lib.fw_batch_done([], 0)
+    m.lib.fw_exchange_done()
+    assert m.read() == before
+    m.until(lambda s: s["phase"] == ACTIVATION)
+    assert m.lib.fw_cycle_done((0, 0, 0), (0, 0, 0), [0] * 8) == BAD_STATE and m.lib.fw_slave_lost([2, 0]) == BAD_STATE
+    m.until(lambda s: s["las"])
+    s = m.read()
+    assert s["phase"] == ACTIVATION and m.lib.fw_slave_lost([2, 0]) == 0
+    assert m.read()["las"] == s["las"] - {1} and not m.port.cycle
+    m.until(lambda s: len(s["las"]) == 62)
+
+
+def test_new_activation_waits_for_the_sequencer():
+    """EX-024: data exchange comes back: the cycle under way ends first."""
+    m = Master([std(1)], data_exchange=False).start().cycles(2)
+    m.set_data_exchange(True)
+    assert not m.port.idle
+    m.lib.fw_tick(1024)
+    assert m.read()["phase"] == DATA_EXCHANGE
+    m.cycle()
+    m.tick()
+    assert m.read()["phase"] == ACTIVATION
+
+
+def test_zero_with_the_other_select_and_without_id2():
+    """AD-007, EX-005, EX-004: what is known of a slave at address 0 does not depend on the select it was read with."""
+    m = Master([std(0, id=1, old=True, zero_select="1"), std(3)]).start()
+    assert m.read()["lds"] == {0, 3} and m.read()["cdi"][0] == m.slaves[0].codes
+    m.rounds(4)
+    assert m.read()["lds"] == {0, 3}
+
+
+def test_slave_whose_codes_are_all_f():
+    """EX-013, EX-016: codes FFFF are those of a slave too, once it is in LDS."""
+    m = Master([std(1), std(9, io=15, id=15, id1=15, id2=15, present=False)]).start()
+    m.slaves[1].present = True
+    m.rounds()
+    assert m.read()["lds"] == m.read()["las"] == {1, 9} and m.read()["flags"] == m.expected_flags(m.read())
+
+
 def test_suspected_duplicates():
     """EX-034: garbled answers raise the suspicion, missing ones lower it, good ones too; a list only, nothing acts."""
     m = Master([std(1), std(4)]).start()
@@ -835,6 +884,8 @@ def test_suspected_duplicates():
     m.lib.fw_quality(4, 3, 0, 1)  # P_SUSPECT = 12
     assert m.read()["suspects"] == {4}
     m.lib.fw_quality(1, 0, 50, 3)  # a dead slave
+    m.lib.fw_quality(4, 0, 1, 0)
+    m.lib.fw_quality(4, 0, 0, 0)  # not called
     assert m.read()["suspects"] == {4}
     m.lib.fw_quality(4, 0, 6, 0)
     assert not m.read()["suspects"] and m.read()["las"] == las

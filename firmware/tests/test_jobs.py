@@ -489,6 +489,17 @@ def test_refusals_of_a_change():
     assert m.begin(CHANGE, 0, 5) == USED and not m.calls and not m.events(ADDRESSED)
 
 
+def test_wide_slaves_move():
+    """AD-001, AD-009: the addresses of a wide slave (combined transaction 5) may overlap its own old ones, nobody else's;
+    ID2 above C is no wide slave."""
+    def line(*others):
+        return Line([std(10, io=6, id=0, id2=0xB), std(20, io=6, id=0, id2=0xD), *others]).start()
+    for new, status in ((9, 0), (11, 0), (8, 0), (7, 0), (29, 0), (30, USED), (18, USED), (17, 0)):
+        assert line().begin(CHANGE, 10, new) == status, new
+    assert line(ab(45)).begin(CHANGE, 10, 11) == USED  # the B slave of a member's number
+    assert line().begin(CHANGE, 20, 31) == 0
+
+
 def test_change_and_auto_clear():
     """AD-001, EX-033: a projected slave would be missing at once and stop the line; others may move."""
     m = Line([std(3), std(4)], projected=[std(3)], protected=True).start()
@@ -675,8 +686,111 @@ def test_abort_at_every_step(how):
         assert m.begin(EXECUTE, 4, 16) == 0
 
 
+def at_call(m, name_, action):
+    """Do something in the plant just before the first job call of this name. The call goes on as usual."""
+    done = []
+
+    def fault(k, call, attempt):
+        if name(call, {s.index & 31 for s in m.slaves if s.extended}) == name_ and not done:
+            done.append(action())
+    m.fault = fault
+    return done
+
+
+class Odd(Slave):
+    """Answers one call with a wrong nibble."""
+    def answer(self, call):
+        data = super().answer(call)
+        return data if data is None or call >> 5 != self.odd else 1
+
+    odd = None
+
+
+def test_wrong_answers():
+    """AD-002, AD-004: DELA not with 0, ADRA not with 6: the next call tells what happened."""
+    m = Line([Odd(3), std(4)]).start()
+    m.slaves[0].odd = 0x400 >> 5 | 3  # commands to 3, DELA among them
+    m.until(lambda: m.begin(CHANGE, 3, 9) == 0)
+    m.slaves[0].odd = 0x400 >> 5 | 3
+    m.until(lambda: m.job().status != BUSY)
+    assert m.job().status == 0 and m.slaves[0].index == 9
+    m.slaves[0].odd = 0  # ADRA
+    assert m.do(CHANGE, 9, 3) == 0 and "RDID 3" in m.names() and m.slaves[0].index == 3
+    m.agree()
+
+
+def test_other_slaves_come_in_the_way():
+    """AD-002, AD-004, AD-005: a slave with another ID code shows up where the moved one is looked for: it is not taken
+    for it, and both are found in the end."""
+    m = Line([std(3, old=True), std(4), std(0, id=1, old=True, present=False)]).start()
+
+    def fault(k, call, attempt):
+        m.slaves[2].present = True
+        return "deaf" if k == 0 else None
+    m.fault = fault
+    assert m.do(CHANGE, 3, 9) == DELETE and m.names()[:4] == ["DELA 3", "RID1 0", "RDID 0", "RDID 3"]
+    assert m.read()["las"] >= {3, 4}
+    m.agree()
+
+    m = Line([std(3), std(4), std(9, id=1, present=False)]).start()
+    at_call(m, "ADRA 9", lambda: (setattr(m.slaves[0], "deaf", 3), setattr(m.slaves[2], "present", True)))
+    assert m.do(CHANGE, 3, 9) == SET_ADDRESS and m.slaves[0].index == 3 and m.names()[2:4] == ["ADRA 9", "RDID 9"]
+    m.agree()
+
+    m = Line([std(3, mute=frozenset({"RDST"})), std(4)]).start()
+    at_call(m, "RDID 9", lambda: setattr(m.slaves[0], "id", 1))
+    assert m.do(CHANGE, 3, 9) == SET_ADDRESS
+    m.agree()
+
+
+@pytest.mark.parametrize("call", ["WPAR 9", "DEXG 9"])
+def test_projection_changes_during_a_change(call):
+    """AD-006, EX-009: the new address is not projected any more when the slave there would be activated."""
+    m = Line([std(3), std(4)], projected=[std(4), std(9)], protected=True).start()
+
+    def unproject():
+        m.lps = {4}
+        assert m.lib.fw_set_projection([1 << 4, 0], m.pcd, [15] * 64) == 0
+    assert not at_call(m, call, unproject)
+    assert m.do(CHANGE, 3, 9) == 0 and m.read()["las"] == {4} and m.read()["lds"] == {4, 9}
+    m.agree()
+
+
+def test_write_id1_of_a_standard_slave_that_falls_silent():
+    """FN-024, AD-007: no status, no ID1: there is no other select to try."""
+    m = Line([std(0, id1=4, mute=frozenset({"RDST"})), std(4)]).start()
+    assert m.do(WRITE_ID1, value=9) == ID1_TEMPORARY and m.slaves[0].id1 == 9
+    m.agree()
+    m.slaves[0].mute = frozenset()
+    m.fault = lambda k, call, attempt: "mute" if k == 3 else None
+    assert m.do(WRITE_ID1, value=2) == NO_ID1 and m.names()[-1] == "RID1 0" and m.slaves[0].id1 == 2
+    m.agree()
+
+
+def test_nobody_left_to_look_for():
+    """FN-024, EX-012: with all 62 active and address 0 taken by the function inclusion has nobody to probe, until its end."""
+    m = Line([ab(n + sel) for n in range(1, 32) for sel in (0, 32)] + [std(0, id1=4, write_us=30_000)]).start()
+    m.until(lambda: len(m.read()["las"]) == 62)
+    assert m.begin(WRITE_ID1, 0, 9) == 0
+    silent = 0
+    while m.job().status == BUSY:
+        m.step()
+        silent += not m.port.inclusion_valid
+    assert m.job().status == 0 and silent > 3 and m.port.inclusion_valid
+    m.slaves[5].present = False
+    m.until(lambda: len(m.read()["lds"]) == 62)
+    m.slaves[5].present = True
+    m.until(lambda: len(m.read()["las"]) == 62)
+
+
+def test_parameter_as_it_was():
+    """FN-005: writing the parameter in use is a call like any other."""
+    m = Line([std(3)]).start()
+    assert m.do(WRITE_PARAMETER, 3, 15) == 0 and m.job().data == 15 and len(m.calls) == 1
+
+
 def left_behind(scene, how, heard, step, protected=False, auto=False):
-    """A change broken off before call `step` of it, the answer to the last call before lost or not; the next start is
+    """A change broken off before call `step` of it, the last call before it with this fault, if any; the next start is
     over. -> line, or None: the change had ended before"""
     slaves, old, new = SCENES[scene]
     here = slaves()
@@ -714,8 +828,8 @@ def test_a_slave_left_behind_can_be_addressed(scene, how):
     and function 20 brings it back."""
     old, places = SCENES[scene][1], Counter()
     for protected in (False, True):
-        for heard in (None, "mute"):
-            for step in range(1, clean_length(scene) + 1):
+        for heard in (None, "mute", "deaf"):
+            for step in range(1, 2 if heard == "deaf" else clean_length(scene) + 1):
                 m = left_behind(scene, how, heard, step, protected)
                 if m is None:
                     break
@@ -967,7 +1081,7 @@ def fake_strings():
     text = (ROOT / "firmware/tests/native.h").read_text()
     ffi.cdef(text.split("/* cffi begin */")[1].split("/* cffi end */")[0])
     ffi.cdef("extern int fake_refuse; extern unsigned fake_kind;"
-             "void fake_end(int status, unsigned length); int fake_open(void);")
+             "extern int fake_holds; void fake_end(int status, unsigned length); int fake_open(void);")
     counting = os.environ.get("FW_COVERAGE") == "1"
     name, flags = ("libasi_strings_branches.so", ["-O0", "--coverage", "-DFW_GCOV"]) if counting else (
         "libasi_strings.so", ["-O1", *SANITIZE])
@@ -1031,6 +1145,7 @@ def test_refusals_of_strings(fake_strings):
     m = strings_line(fake_strings, parameters={3: 4})
     assert m.slaves[0].parameter == 15 and m.begin(WRITE_PARAMETER, 3, 4) == PROFILE
     assert m.begin(READ_STRING, 20) == NOT_ACTIVE and m.begin(READ_STRING, 0) == ARG == m.begin(READ_STRING, 32)
+    assert m.begin(WRITE_STRING, 3) == ARG == m.begin(WRITE_STRING, 0, 0, b"abc")
     for index in (4, 5, 7):
         assert m.begin(READ_STRING, index) == PROFILE and m.begin(WRITE_STRING, index, 0, b"abc") == PROFILE
     assert m.begin(MESSAGE, 3, 0, b"a") == PROFILE
@@ -1072,6 +1187,43 @@ def test_string_parameter_that_stays(fake_strings):
     assert m.job().status == 0 and 3 not in m.read()["las"] and 3 in m.read()["lds"]
     m.agree()
     assert m.slaves[0].parameter == 15
+
+
+def test_string_waits_for_the_value_under_way(fake_strings):
+    """FN-027: the string begins when the engine lets go of the cyclic value, and fails when it never does."""
+    m = strings_line(fake_strings)
+    m.lib.fake_holds = 6
+    del m.calls[:]
+    assert m.begin(READ_ID, 3) == 0
+    m.cycles(2)
+    assert not m.calls and m.job().status == BUSY
+    m.until(lambda: m.lib.fake_open(), 20)
+    m.lib.fake_end(0, 1)
+    m.until(lambda: m.job().status != BUSY, 20)
+    m.lib.fake_holds = EVER
+    start = m.port.time_us
+    del m.calls[:]
+    assert m.begin(READ_ID, 3) == 0
+    m.until(lambda: m.job().status != BUSY)
+    assert m.job().status == TRANSFER and not m.calls and m.port.time_us - start > 100_000
+    m.lib.fake_holds = 0
+
+
+def test_string_end_of_a_lost_slave(fake_strings):
+    """FN-027, CT-005: the slave is gone when the string is over: nothing is left to be set right."""
+    m = strings_line(fake_strings)
+    assert m.begin(READ_ID, 3) == 0
+    m.until(lambda: m.lib.fake_open(), 20)
+    m.lib.fake_end(0, 9)
+
+    def fault(k, call, attempt):
+        m.slaves[0].present = False
+        m.lib.fw_slave_lost([1 << 3, 0])
+        return "deaf"
+    m.fault = fault
+    m.until(lambda: m.job().status != BUSY)
+    assert m.job().status == 0 and 3 not in m.read()["lds"]
+    m.agree()
 
 
 def test_string_of_a_lost_slave(fake_strings):
