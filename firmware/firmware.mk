@@ -34,7 +34,7 @@ $(FW)/boot.hex: $(FW)/boot.elf tools/elf2hex.py
 	@$(VPY) tools/elf2hex.py $< --hex $@ --limit 1024
 
 .PHONY: firmware-coverage
-firmware-coverage: $(VENV)/.ready  ## native firmware tests with line and branch coverage of firmware/core (needs gcov); UNTAKEN=1 lists the rest
+firmware-coverage: $(VENV)/.ready  ## table of line and branch coverage of firmware/core (needs gcov); UNTAKEN=1 names the rest
 	@rm -rf $(FW)/native
 	@FW_COVERAGE=1 $(VPY) -m pytest firmware/tests -k 'not image'
 	@$(VPY) tools/coverage_table.py $(FW)/native --below 95 $(if $(filter 1,$(UNTAKEN)),--untaken)

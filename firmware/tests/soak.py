@@ -176,6 +176,8 @@ class World:
                 getattr(self, self.dice.choice(self.actions))()
             for _ in range(self.dice.choice((1, 3, 20, 100))):
                 self.m.step()
+            if not self.m.slaves:
+                self.appears()  # else the cycles would never come
             if self.m.apf and self.dice.random() < 0.5:
                 self.m.power(False)
             if self.m.controls()["offline"] and self.dice.random() < 0.5:

@@ -490,8 +490,8 @@ def test_refusals_of_a_change():
 
 
 def test_wide_slaves_move():
-    """AD-001, AD-009: the addresses of a wide slave (combined transaction 5) may overlap its own old ones, nobody else's;
-    ID2 above C is no wide slave."""
+    """AD-001, AD-009: the addresses of a wide slave (combined transaction 5) may overlap its own old ones,
+    nobody else's; ID2 above C is no wide slave."""
     def line(*others):
         return Line([std(10, io=6, id=0, id2=0xB), std(20, io=6, id=0, id2=0xD), *others]).start()
     for new, status in ((9, 0), (11, 0), (8, 0), (7, 0), (29, 0), (30, USED), (18, USED), (17, 0)):
@@ -768,7 +768,7 @@ def test_write_id1_of_a_standard_slave_that_falls_silent():
 
 
 def test_nobody_left_to_look_for():
-    """FN-024, EX-012: with all 62 active and address 0 taken by the function inclusion has nobody to probe, until its end."""
+    """FN-024, EX-012: with all 62 active and address 0 taken by the function inclusion has nobody to probe."""
     m = Line([ab(n + sel) for n in range(1, 32) for sel in (0, 32)] + [std(0, id1=4, write_us=30_000)]).start()
     m.until(lambda: len(m.read()["las"]) == 62)
     assert m.begin(WRITE_ID1, 0, 9) == 0
@@ -824,8 +824,8 @@ def left_behind(scene, how, heard, step, protected=False, auto=False):
 @pytest.mark.parametrize("scene", ["standard", "a to b", "b to a"])
 def test_a_slave_left_behind_can_be_addressed(scene, how):
     """FN-033, AD-001, AD-002, AD-007, EX-032: OFFLINE, power fail or a new activation leave the slave at its old
-    address, its new one or 0: there it is found in either mode, LDS.0 shows it, the change to protected mode is refused,
-    and function 20 brings it back."""
+    address, its new one or 0: there it is found in either mode, LDS.0 shows it, the change to protected mode is
+    refused, and function 20 brings it back."""
     old, places = SCENES[scene][1], Counter()
     for protected in (False, True):
         for heard in (None, "mute", "deaf"):
