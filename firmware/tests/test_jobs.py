@@ -880,6 +880,15 @@ def test_a_slave_left_behind_and_automatic_addressing():
         assert "config_ok" in m.agree().read()["flags"]
 
 
+def test_deleted_address_and_automatic_addressing():
+    """AD-002, AD-008: a projected slave that the host sends to 0 is the missing one: automatic addressing brings it back."""
+    m = Line([std(3), std(4)], projected=[std(3), std(4)], protected=True, auto=True).start()
+    assert m.do(CHANGE, 3, 0) == 0
+    m.until(lambda: m.read()["las"] == {3, 4}, 400)
+    assert m.events(ADDRESSED) == [(0, 3), (3, 0)]
+    m.agree()
+
+
 # ------------------------------------------------------------------------------------------ ID1 at address 0
 def test_write_id1():
     """FN-024: written, waited for, read back, shown in CDI; nothing else."""
