@@ -4,6 +4,7 @@
 Needs build/tb/libasi_chip.so and build/firmware/asi_test.hex; `make test` builds both.
 """
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -72,10 +73,19 @@ def test_only_the_right_slaves_get_data(ran):
 
 def test_full_networks_keep_the_cycle(ran):
     """LK-011, LK-012: 31 slaves and an extra call stay below 4.95 ms, and equal cycles do not differ by a clock."""
-    plant, result, _ = ran
+    plant, result, records = ran
     cycles = result["cycles"]
     if len({index & 31 for index in plant.host.pcd}) == 31:
-        assert cycles["max_ns"] <= 4_950_000 and cycles["max_ns"] - cycles["min_ns"] <= 1e9 / result["run"]["clk_hz"]
+        assert cycles["max_ns"] <= 4_950_000
+        records = [record for record in records if record["phase"] in ("DATA_EXCHANGE", "MANAGEMENT", "INCLUSION")]
+        starts = [k for k, record in enumerate(records) if record["call"] == "DEXG" and record["index"] & 31 == 1
+                  and not record["repeated"]]
+        equal = {}  # periods by what became of each call: a status that is read takes 4 us more than a probe in vain
+        for a, b in pairwise(starts):
+            calls = tuple((record["class"], record["delay_ns"]) for record in records[a:b])
+            equal.setdefault(calls, []).append(records[b]["t_ns"] - records[a]["t_ns"])
+        assert 0 < len(equal) <= 2 and sum(map(len, equal.values())) > 20
+        assert all(max(same) - min(same) <= 1e9 / result["run"]["clk_hz"] for same in equal.values())
     assert cycles["count"] > 20
 
 
