@@ -121,8 +121,8 @@ static void show_log(const asi_log_t *log)
     WIN(LOG_HEAD)[0] = shown_log; /* last */
 }
 
-/** EX-033: the end state of auto clear lasts until the host leaves the offline phase, so no commit may do that in passing.
- * Before the host sees the phase, and one bit at once: it may be preparing a commit. */
+/** EX-033: the end state of auto clear lasts until the host leaves the offline phase, so no commit may do that in
+ * passing. Before the host sees the phase, and one bit at once: it may be preparing a commit. */
 static void follow_auto_clear(const asi_ec_t *ec)
 {
     if (host_offline || monitor || !asi_fn_controls(ec).offline)
@@ -318,7 +318,7 @@ static void serve_function(asi_ec_t *ec)
         if (job->status == ASI_E_BUSY)
             return;
         fn_open = false;
-        if (WIN(FN_SEQ)[0] == fn_seq) /* else the words are the next function's already, and nobody waits for this answer */
+        if (WIN(FN_SEQ)[0] == fn_seq) /* else the words are the next function's, and nobody waits for this answer */
             end_job(job, string);
     }
     const uint32_t seq = WIN(FN_SEQ)[0];
@@ -327,7 +327,7 @@ static void serve_function(asi_ec_t *ec)
     const uint32_t code = WIN(FN_CODE)[0], a = WIN(FN_ARG)[0], b = WIN(FN_ARG)[1], length = WIN(FN_LEN)[0];
     asi_status_t status = ASI_E_OVERFLOW;
     if (length <= sizeof string->bytes && length <= STRING_BYTES) {
-        if (code == ASI_JOB_WRITE_PARAMETER_STRING || code == ASI_JOB_MESSAGE) /* no job is open, so the buffer is ours */
+        if (code == ASI_JOB_WRITE_PARAMETER_STRING || code == ASI_JOB_MESSAGE) /* no job is open: the buffer is ours */
             for (unsigned k = 0; k < length; k++)
                 string->bytes[k] = WINDOW(uint8_t, FN_STRING)[k];
         hal_irq_off();

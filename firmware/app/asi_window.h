@@ -22,6 +22,7 @@ void asi_window_publish(asi_ec_t *ec);
 void asi_window_show_load(uint32_t us);
 /** True when something besides the images changed since the last publication. */
 bool asi_window_is_stale(const asi_ec_t *ec);
-/** Apply the host's commit, start or finish its function (HW-002, HW-008). Main loop. @return true: call again at once */
+/** Apply the host's commit, start or finish its function (HW-002, HW-008). Main loop. @return true: call again at
+ * once */
 bool asi_window_serve(asi_ec_t *ec);
 #endif

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/** @file main.c  Line work in the interrupt; the host's commits and functions, diagnosis and storage in the main loop. */
+/** @file main.c  Line work in the interrupt; the host's commits and functions, diagnosis and storage in the main
+ * loop. */
 #include "asi_diag.h"
 #include "asi_hal.h"
 #include "asi_hw.h"

@@ -41,12 +41,13 @@
 /** P_FAIL_CYCLES, cycles: the sequencer's limit of failures in a row, SLOT_STATE.streak of a lost slave (LK-004). */
 #define ASI_FAIL_CYCLES 3u
 
-/** P_RDST_EVERY, cycles: a status poll in every so many cycles without other management (EX-027). With one extra slot more
- * polls would slow inclusion down: EX-030. */
+/** P_RDST_EVERY, cycles: a status poll in every so many cycles without other management (EX-027). With one extra
+ * slot more polls would slow inclusion down: EX-030. */
 #ifndef ASI_RDST_EVERY
 #define ASI_RDST_EVERY 3u
 #endif
-/** P_S1_MIN_V21, 0 or 1: S1 of a slave without ID2 is ignored, before specification 2.1 it was a parity error (EX-028). */
+/** P_S1_MIN_V21, 0 or 1: S1 of a slave without ID2 is ignored, before specification 2.1 it was a parity error
+ * (EX-028). */
 #ifndef ASI_S1_MIN_V21
 #define ASI_S1_MIN_V21 1
 #endif
@@ -74,8 +75,9 @@
 #ifndef ASI_CTT_MIN_CYCLE_US
 #define ASI_CTT_MIN_CYCLE_US 1000u
 #endif
-/** P_SUSPECT, points: a garbled answer of a slave (not a missing one) counts one up, a missing one two down, a good one in
- * 16 cycles one down; at this many a duplicate address is suspected (EX-034). */
+/** P_SUSPECT, points: at this many a duplicate address is suspected, at 0 no more (EX-034). In each look at a slave's
+ * statistics garbled answers count when they are four times the missing ones and a quarter of the good ones; else a
+ * missing answer takes two off, a look with good ones only takes one. */
 #ifndef ASI_SUSPECT
 #define ASI_SUSPECT 12u
 #endif

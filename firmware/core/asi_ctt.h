@@ -149,8 +149,8 @@ static inline bool asi_ctt_any(const asi_ctt_t *c)
     return (c->live.w[0] | c->live.w[1] | c->groups | c->grouped | c->safety) != 0u;
 }
 
-/** Whether a string to write is whole sequences of 3 bytes, n up to 255. The core cannot divide, and a loop that subtracts
- * becomes a division in some compilers. */
+/** Whether a string to write is whole sequences of 3 bytes, n up to 255. The core cannot divide, and a loop that
+ * subtracts becomes a division in some compilers. */
 static inline bool asi_ctt_whole_sequences(unsigned n)
 {
     n = (n & 3u) + (n >> 2 & 3u) + (n >> 4 & 3u) + (n >> 6 & 3u); /* 4 leaves 1 */

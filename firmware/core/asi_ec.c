@@ -8,7 +8,8 @@
 
 static void add_request(asi_ec_t *ec, unsigned index, uint16_t call)
 {
-    ec->requests[ec->batch_len] = (asi_request_t){.call = call, .retries = ASI_CMD_RETRY, .sel = index > ZERO_SEL1}; /* EX-010 */
+    ec->requests[ec->batch_len] =
+        (asi_request_t){.call = call, .retries = ASI_CMD_RETRY, .sel = index > ZERO_SEL1}; /* EX-010 */
     ec->request_index[ec->batch_len] = (uint8_t)index;
     ec->batch_len++;
 }
@@ -352,7 +353,8 @@ static void auto_clear(asi_ec_t *ec)
     ec_stop(ec, ASI_OFFLINE_AUTO_CLEAR);
 }
 
-/** A live slave, if it was called since the last look: its answer to the engine, the engine's next nibble to its slot. */
+/** A live slave, if it was called since the last look: its answer to the engine, the engine's next nibble to its
+ * slot. */
 static void exchange_live(asi_ec_t *ec, unsigned i, uint32_t now_us)
 {
     const asi_slot_state_t slot = asi_port_slot_state(i);
@@ -384,7 +386,8 @@ void asi_ec_exchange_done(asi_ec_t *ec)
     if (ec->state.phase != ASI_PHASE_DATA_EXCHANGE || !ec->permanent.data_exchange)
         return;
     const uint32_t now_us = asi_port_time_us();
-    /* by numbers, as they will be called; a plain walk, because looking for bits costs more than the few that are not live */
+    /* by numbers, as they will be called; a plain walk, because looking for bits costs more than the few that are
+     * not live */
     for (uint32_t n = 1u, a = live.w[0] >> 1, b = live.w[1] >> 1; (a | b) != 0u; n++, a >>= 1, b >>= 1) {
         if (a & 1u)
             exchange_live(ec, n, now_us);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /**
  * @file asi_ec.h  Execution control of one AS-i line: OFFLINE, DETECTION, ACTIVATION, normal operation (EX-001 ..).
- * asi_ec.c has phases and reports from below, asi_state.c lists, flags and images, asi_inclusion.c the inclusion machine,
- * asi_functions.c what the host asks for at once, asi_jobs.c what needs telegrams.
+ * asi_ec.c has phases and reports from below, asi_state.c lists, flags and images, asi_inclusion.c the inclusion
+ * machine, asi_functions.c what the host asks for at once, asi_jobs.c what needs telegrams.
  * Layer: protocol core; knows no register. Memory: one asi_ec_t, owned by the caller, nothing else.
  * Context: not reentrant. All functions run in the interrupt, or with it masked.
  * Images are at host level here; the line level (CA-005) exists only below asi_port.h.

@@ -141,7 +141,8 @@ asi_status_t asi_fn_set_controls(asi_ec_t *ec, const asi_controls_t *c)
 
     const bool new_mode = c->protected_mode != p->protected_mode;
     const bool starts = c->data_exchange && !p->data_exchange, stops = !c->data_exchange && p->data_exchange;
-    const bool changed = new_mode || starts || stops || c->auto_address != p->auto_address || c->auto_clear != p->auto_clear;
+    const bool changed = new_mode || starts || stops || c->auto_address != p->auto_address ||
+                         c->auto_clear != p->auto_clear;
     p->protected_mode = c->protected_mode;
     p->auto_address = c->auto_address;
     p->auto_clear = c->auto_clear;

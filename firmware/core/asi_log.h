@@ -27,7 +27,8 @@ typedef enum {
 
 /** Why the line is offline. */
 typedef enum {
-    ASI_OFFLINE_START = 0, ASI_OFFLINE_HOST = 1, ASI_OFFLINE_POWER = 2, ASI_OFFLINE_MODE = 3, ASI_OFFLINE_AUTO_CLEAR = 4,
+    ASI_OFFLINE_START = 0, ASI_OFFLINE_HOST = 1, ASI_OFFLINE_POWER = 2, ASI_OFFLINE_MODE = 3,
+    ASI_OFFLINE_AUTO_CLEAR = 4,
 } asi_offline_cause_t;
 
 #define ASI_LOG_ENTRIES 64u /**< a power of two */

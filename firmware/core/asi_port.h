@@ -2,7 +2,8 @@
 /**
  * @file asi_port.h  What the protocol core needs from below. The HAL implements it on link RAM and registers
  * (firmware/hal/asi_hal.c), the native build on a fake sequencer (firmware/tests/native.c).
- * Reports come back through asi_ec_batch_done, asi_ec_exchange_done, asi_ec_cycle_done, asi_ec_slave_lost, asi_ec_power.
+ * Reports come back through asi_ec_batch_done, asi_ec_exchange_done, asi_ec_cycle_done, asi_ec_slave_lost and
+ * asi_ec_power.
  */
 #ifndef ASI_PORT_H
 #define ASI_PORT_H
@@ -50,9 +51,11 @@ bool asi_port_idle(void);
 void asi_port_batch(const asi_request_t *requests, unsigned n);
 /** Run cycles this way; may be repeated at any time. NULL: stop after the present one. */
 void asi_port_cycle(const asi_cycle_mode_t *mode);
-/** Call this index in the cycle, or not. extended: I3 of the call is ~Sel. live: the nibble is that of asi_port_live. */
+/** Call this index in the cycle, or not. extended: I3 of the call is ~Sel. live: the nibble is that of
+ * asi_port_live. */
 void asi_port_slot(unsigned index, bool active, bool extended, bool live);
-/** Next nibble of a live slot, line level; it goes out with the next call of this slot that begins afterwards (LK-018). */
+/** Next nibble of a live slot, line level; it goes out with the next call of this slot that begins afterwards
+ * (LK-018). */
 void asi_port_live(unsigned index, unsigned nibble);
 /** Books of an active slot. */
 asi_slot_state_t asi_port_slot_state(unsigned index);
@@ -62,7 +65,8 @@ void asi_port_forget(unsigned index);
 void asi_port_management(const asi_request_t *request);
 /** The call of all inclusion slots from now on; NULL: none. */
 void asi_port_inclusion(const asi_request_t *request);
-/** Output nibbles at line level, taken at the start of a cycle, all or nothing. Nibbles of live slots are not touched. */
+/** Output nibbles at line level, taken at the start of a cycle, all or nothing. Nibbles of live slots are not
+ * touched. */
 void asi_port_outputs(const uint32_t image[ASI_IMAGE_WORDS]);
 /** Phase to show outside running cycles. OFFLINE only with the line off. */
 void asi_port_phase(asi_phase_t phase);

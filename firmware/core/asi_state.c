@@ -155,7 +155,7 @@ void ec_set_pi(asi_ec_t *ec, unsigned index, uint8_t parameter)
 void ec_send_outputs(asi_ec_t *ec)
 {
     bool changed = false;
-    for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++) { /* idle F, payload of active slaves inverted; I3 of A/B calls is not ours */
+    for (unsigned w = 0; w < ASI_IMAGE_WORDS; w++) { /* idle F, payload inverted; I3 of A/B calls is not ours */
         const uint32_t line = (ec->out_host[w] ^ ec->invert[w]) | ~ec->las_mask[w];
         changed |= line != ec->out_line[w];
         ec->out_line[w] = line;

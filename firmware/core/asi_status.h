@@ -2,7 +2,8 @@
 /**
  * @file asi_status.h  The one enumeration of errors of the firmware (EX-025).
  * 0 is success; errors are negative and a number is never reused. A function that returns one has changed nothing;
- * an address change that ends with one may have left the slave at address 0 or at its old one (docs/execution_control.md).
+ * an address change that ends with one may have left the slave at address 0 or at its old one
+ * (docs/execution_control.md).
  */
 #ifndef ASI_STATUS_H
 #define ASI_STATUS_H

@@ -21,8 +21,8 @@ static asi_result_t results[ASI_INDICES];
 
 static uint32_t request_word(const asi_request_t *request)
 {
-    return request->call | (request->no_reply ? REQUEST_R__NO_REPLY_bm : 0u) |
-           (request->sel ? REQUEST_R__SEL_bm : 0u) | (uint32_t)request->retries << REQUEST_R__RETRIES_bp | (uint32_t)request->tag << REQUEST_R__TAG_bp;
+    return request->call | (request->no_reply ? REQUEST_R__NO_REPLY_bm : 0u) | (request->sel ? REQUEST_R__SEL_bm : 0u) |
+           (uint32_t)request->retries << REQUEST_R__RETRIES_bp | (uint32_t)request->tag << REQUEST_R__TAG_bp;
 }
 
 static asi_result_t result_of(uint32_t word)

@@ -41,8 +41,8 @@ asi_list_t hal_lost_slaves(void);
 bool hal_apf(void);
 hal_counters_t hal_counters(void);
 enum { HAL_STAT_WORDS = 16 };
-/** Statistics of an index, HAL_STAT_WORDS words of stat_r in rdl/asi.rdl; each word is right, two of them may be an attempt
- * apart. */
+/** Statistics of an index, HAL_STAT_WORDS words of stat_r in rdl/asi.rdl; each word is right, two of them may be an
+ * attempt apart. */
 const volatile uint32_t *hal_stat(unsigned index);
 /** The same, and reading a word clears it; no count is lost (ST-004). */
 const volatile uint32_t *hal_stat_take(unsigned index);
