@@ -469,7 +469,7 @@ async def as_the_library(dut):
     async def hear(train):
         return await tb.hear(train, 130_000)
 
-    @settings(max_examples=150, deadline=None, derandomize=True, database=None,
+    @settings(max_examples=250, deadline=None, derandomize=True, database=None,
               suppress_health_check=list(HealthCheck), phases=[Phase.generate, Phase.shrink])
     @given(damaged_trains())
     def compare(train_ns):

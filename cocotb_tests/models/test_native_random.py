@@ -12,6 +12,7 @@ from asi.native import Chip
 from asi.plant import Codes
 from asi.window import HostWindow
 
+SLAVE0 = -6  # asi_status_t
 FIRMWARE = Path(__file__).parents[2] / "build/firmware/asi_test.hex"
 US, MS = 1_000, 1_000_000
 OUTPUT_BITS = (0, 8, 0, 12, 0, 14, 0, 0, 15, 7, 7, 3, 3, 1, 1, 0)  # by IO code, D0 = bit 0: echoed in the answer
@@ -87,6 +88,10 @@ class World:
         while (result := self.window.result(sequence)) is None:
             assert self.chip.time_ns < limit, "the commit is not served"
             self.run(100 * US)
+        if result == SLAVE0:  # EX-032: protected mode waits until nobody has address 0
+            assert self.control >> r.HOST_CTRL_PROTECTED_MODE_LSB & 1
+            self.control &= ~(1 << r.HOST_CTRL_PROTECTED_MODE_LSB)
+            return self.commit()
         assert result == 0
 
     # ---- what happens
@@ -160,9 +165,9 @@ class World:
             assert call.phase != r.Phase.OFFLINE
             command, number, info = call.call >> 10, call.call >> 5 & 31, call.call & 31
             if call.phase == r.Phase.DATA_EXCHANGE:
-                assert number and not command and info < 16
+                assert number and (info & 23 == 17 if command else info < 16)  # RDID: data exchange is off (LK-021)
             else:
-                assert info & 23 in (16, 17, 18, 19) if command else number
+                assert info & 23 in (16, 17, 18, 19, 22) if command else number  # RDIO .. RID2, RDST of a poll
             gap = following.t_ns - call.t_ns - 78_000
             expected = {0: call.delay_ns + 36_000 + 18_500, 1: 72_000}.get(call.error_class, 24_000)
             assert gap >= expected - 62
@@ -194,7 +199,10 @@ class World:
         assert state.flags["config_ok"] == (match == set(present) == set(self.pcd))
         for index in active:
             slave = present[index]
-            line = 15 & ~self.outputs[index] if self.control & DATA_EXCHANGE else 15
+            if not self.control & DATA_EXCHANGE:  # EX-024: nobody brings data either way
+                assert image[index] == 0
+                continue
+            line = 15 & ~self.outputs[index]
             assert not (self.net.state(slave.handle).outputs ^ line) & slave.payload
             assert image[index] == line & slave.echo | slave.past[-1][1] & ~slave.echo
         self.check_calls(log, active)
