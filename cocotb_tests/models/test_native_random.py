@@ -205,7 +205,8 @@ class World:
             line = 15 & ~self.outputs[index]
             assert not (self.net.state(slave.handle).outputs ^ line) & slave.payload
             assert image[index] == line & slave.echo | slave.past[-1][1] & ~slave.echo
-        self.check_calls(log, active)
+        # without data exchange watchdogs reset their slaves, which are silent for a while
+        self.check_calls(log, active if self.control & DATA_EXCHANGE else ())
 
 
 @pytest.mark.parametrize("seed", range(4))
