@@ -8,11 +8,6 @@
 #define ASI_FUNCTIONS_H
 #include "asi_ec.h"
 
-/** 1 Read_IDI: input nibble, host level. */
-static inline unsigned asi_fn_read_idi(const asi_ec_t *ec, unsigned index)
-{
-    return ec->state.in[asi_word(index & 63u)] >> asi_shift(index) & 15u;
-}
 /** 2 Write_ODI: output image, host level, for the cycles from now on. */
 void asi_fn_write_odi(asi_ec_t *ec, const uint32_t image[ASI_IMAGE_WORDS]);
 /** 3 Set_Permanent_Parameter. @return ASI_E_ARG */
@@ -32,7 +27,7 @@ ASI_MUST_USE asi_status_t asi_fn_set_lps(asi_ec_t *ec, const asi_list_t *lps);
 ASI_MUST_USE asi_status_t asi_fn_set_projection(asi_ec_t *ec, const asi_projection_t *projection);
 /** Whether that projection would be taken; reads nothing but its argument, so it may run with the interrupt open. */
 ASI_MUST_USE asi_status_t asi_check_projection(const asi_projection_t *projection);
-/** 6, 11, 14, 15, 16, 23 Read_Parameter, Read_Actual_Configuration, Get_LAS, Get_LDS, Get_Flags, Get_LPF:
+/** 1, 6, 11, 14, 15, 16, 23 Read_IDI, Read_Parameter, Read_Actual_Configuration, Get_LAS, Get_LDS, Get_Flags, Get_LPF:
  * asi_ec_state. */
 
 /** 17, 18, 19, 21 Set_Operation_Mode, Set_Offline_Mode, Set_Data_Exchange_Active, Set_Auto_Address_Enable, and auto

@@ -789,6 +789,20 @@ def test_parameter_as_it_was():
     assert m.do(WRITE_PARAMETER, 3, 15) == 0 and m.job().data == 15 and len(m.calls) == 1
 
 
+def break_off(m, how):
+    """What ends a job in the middle: OFFLINE, a power fail, or data exchange coming back."""
+    if how == "offline":
+        m.controls(offline=1)
+        m.cycles(3)
+        m.controls(offline=0)
+    elif how == "power":
+        m.power(True)
+        m.cycles(3)
+        m.power(False)
+    elif how == "exchange":
+        m.controls(data_exchange=1)
+
+
 def left_behind(scene, how, heard, step, protected=False, auto=False):
     """A change broken off before call `step` of it, the last call before it with this fault, if any; the next start is
     over. -> line, or None: the change had ended before"""
@@ -803,16 +817,7 @@ def left_behind(scene, how, heard, step, protected=False, auto=False):
     m.until(lambda: len(m.calls) == step or m.job().status != BUSY)
     if m.job().status != BUSY:
         return None
-    if how == "offline":
-        m.controls(offline=1)
-        m.cycles(3)
-        m.controls(offline=0)
-    elif how == "power":
-        m.power(True)
-        m.cycles(3)
-        m.power(False)
-    elif how == "exchange":
-        m.controls(data_exchange=1)
+    break_off(m, how)
     m.until(lambda: m.job().status != BUSY)
     assert m.job().status == ABORT
     m.fault = lambda k, call, attempt: None
@@ -1039,16 +1044,7 @@ def test_aborted_automatic_addressing(how):
     m.controls(data_exchange=how != "exchange")
     new.present = True
     m.until(lambda: m.names() == ["RID1 0"])
-    if how == "offline":
-        m.controls(offline=1)
-        m.cycles(3)
-        m.controls(offline=0)
-    elif how == "power":
-        m.power(True)
-        m.cycles(3)
-        m.power(False)
-    else:
-        m.controls(data_exchange=1)
+    break_off(m, how)
     start = m.port.time_us
     m.until(lambda: 9 in m.read()["las"])
     assert m.port.time_us - start < 700_000 and m.events(ADDRESSED) == [(9, -ABORT << 8), (9, 0)]
